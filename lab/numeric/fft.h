@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: MIT */
+/// Discrete Fourier transforms of the host side, double precision.
+/// C interface on KissFFT's C++ template; a FFTW build replaces the one .cpp file (-DSERVOSCOPE_FFT=fftw).
+#ifndef SERVOSCOPE_NUMERIC_FFT_H
+#define SERVOSCOPE_NUMERIC_FFT_H
+
+#include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/// A plan for one length; not to be shared between threads while in use.
+struct fft_plan;
+
+/// Returns a plan for complex transforms of `length` >= 1 points, NULL if memory is short.
+struct fft_plan *fft_plan_create(size_t length);
+void fft_plan_destroy(struct fft_plan *plan);
+
+/// Y_k = sum_n x_n exp(-j 2 pi k n / N). Data are interleaved real, imaginary pairs: 2 N doubles; in != out.
+void fft_forward(const struct fft_plan *plan, const double *in, double *out);
+/// x_n = sum_k Y_k exp(+j 2 pi k n / N), not divided by N. in != out.
+void fft_inverse(const struct fft_plan *plan, const double *in, double *out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/record/error.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+
+int error_set(struct error *out_error, int status, const char *format, ...)
+{
+    if (out_error) {
+        va_list arguments;
+        va_start(arguments, format);
+        out_error->status = status;
+        vsnprintf(out_error->message, sizeof out_error->message, format, arguments);
+        va_end(arguments);
+    }
+    return status;
+}

@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: MIT */
+/// The plant in continuous time, moved over one substep of constant torque, and the actuator in front of it.
+/// Friction sticks: at rest under less than breakaway torque the motor's speed is exactly zero.
+#ifndef SERVOSCOPE_SIM_PLANT_H
+#define SERVOSCOPE_SIM_PLANT_H
+
+#include "sim/model.h"
+
+#include <stddef.h>
+
+enum { sim_substeps = 8, sim_actuator_history = 64 };
+
+struct sim_plant {
+    double position, velocity;           ///< motor
+    double load_position, load_velocity; ///< of a two-mass drive; copies of the motor's for a rigid one
+    double time_s;
+};
+
+/// Torque command to torque: dead time (fractions of a sample too), then first-order lag.
+struct sim_actuator {
+    double held[sim_actuator_history];   ///< the last references, newest at `newest`
+    size_t newest;
+    double torque;                       ///< state of the lag, Nm
+};
+
+void sim_plant_init(struct sim_plant *self, double position);
+
+/// Moves the plant by dt_s under a motor torque that is constant meanwhile.
+void sim_plant_step(struct sim_plant *self, const struct sim_model *model, double torque, double dt_s);
+
+void sim_actuator_init(struct sim_actuator *self);
+
+/// Takes the reference that holds from this sampling instant on.
+void sim_actuator_hold(struct sim_actuator *self, double torque_ref);
+
+/// The motor torque at the sampling instant just begun (after sim_actuator_hold).
+double sim_actuator_now(const struct sim_actuator *self, const struct sim_model *model);
+
+/// Mean motor torque over substep `index` (0 .. sim_substeps-1) of the current sample; moves the lag's state to its end.
+double sim_actuator_substep(struct sim_actuator *self, const struct sim_model *model, size_t index);
+
+/// What the motor has to overcome at an instant, summed over the model and its effects.
+void sim_plant_opposing(const struct sim_model *model, const struct sim_motion *motion, struct sim_opposing *out_opposing);
+
+#endif
