@@ -38,7 +38,10 @@ struct sim_belt_drive {
     struct sim_actuator actuator;
     uint64_t random[4];
     double velocity_integral; ///< of the velocity controller, Nm
+    double velocity_filtered; ///< state of the speed signal's filter
+    double stop_velocity;     ///< set-point of the quick-stop ramp
     double torque_limit;      ///< clips the reference; infinity if there is none
+    double stop_deceleration; ///< of the quick-stop ramp, rad/s2 or m/s2
     bool hit_end_stop;        ///< sticky
 };
 

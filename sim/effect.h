@@ -15,6 +15,7 @@ struct sim_motion {
     double position;
     double velocity;
     double time_s;
+    bool linear; ///< m and N instead of rad and Nm
 };
 
 /// What the motor has to overcome at one instant. Torques in Nm, or forces in N; positive ones oppose positive speed.
@@ -22,8 +23,8 @@ struct sim_opposing {
     double smooth;       ///< bias, cogging: a function of motion, no friction
     double viscous;      ///< friction that vanishes with speed
     double dry;          ///< friction magnitude that does not: Coulomb, Stribeck; >= 0
-    double dry_positive; ///< factors on all friction for motion in each direction, 1 without asymmetry
-    double dry_negative;
+    double positive_factor; ///< on all friction for motion in each direction, 1 without asymmetry
+    double negative_factor;
 };
 
 /// How diagnosis moves a parameter.
@@ -55,6 +56,24 @@ enum sim_place {
 
 struct sim_model;
 
+/// What a recording covered, for scan values and for whether an effect can show in it at all.
+struct sim_coverage {
+    double position_span;  ///< largest minus smallest position, rad or m
+    double velocity_rms, velocity_peak;
+    double torque_rms;     ///< Nm or N
+    double duration_s;
+    double frequency_max_hz; ///< highest excited line
+    bool linear;
+};
+
+/// What the sentences about an effect need to know.
+struct sim_finding {
+    const double *parameters; ///< estimated, in the order of the effect's parameters
+    const double *deviations; ///< their standard deviations
+    const double *nominal;    ///< the given model's values, zeros where it had none
+    bool linear;
+};
+
 struct sim_effect {
     const char *id; ///< DESIGN.md, "Cause ids"
     enum sim_place place;
@@ -62,15 +81,18 @@ struct sim_effect {
     struct sim_parameter parameters[sim_effect_parameters_max];
     /// Adds what the effect contributes at one instant; NULL for structural effects.
     void (*oppose)(const double *parameters, const struct sim_motion *motion, struct sim_opposing *io_opposing);
-    /// Everything below serves diagnosis; see lab/diagnose.
-    /// Fills in starting values for number `index` of the scan; false past the last. `model` gives the scale.
-    bool (*scan)(const struct sim_model *model, const struct sim_motion *span, size_t index, double *out_parameters);
-    /// NULL, or why this recording cannot show the effect (written to `out_why`): coverage of position, speed, time.
-    bool (*testable)(const double *parameters, const struct sim_motion *span, char *out_why, size_t size);
-    /// Smallest change worth a name, as a share of the RMS torque of the recording.
-    double minimum_share;
-    /// One sentence; printf-like work is done by the effect because only it knows what its numbers mean.
-    void (*says)(const double *parameters, const double *deviations, bool linear, char *out_text, size_t size);
+    /// Switches a structural effect on in a model whose structure lacks it; NULL if there is nothing to switch.
+    void (*engage)(struct sim_model *model);
+    /// Whether diagnosis may ask for the effect on top of this model at all; NULL: always.
+    bool (*applies)(const struct sim_model *model);
+    /// Starting values number `index` for a search, rotary or linear as the model; false past the last one.
+    bool (*scan)(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out_parameters);
+    /// Whether a recording can show the effect with these parameters; if not, says why in one clause.
+    bool (*testable)(const double *parameters, const struct sim_coverage *coverage, char *out_why, size_t size);
+    /// Smallest size worth a name: relative change of a parameter that the given model already has.
+    double minimum_change;
+    /// One sentence for the engineer, every number from the finding.
+    void (*say)(const struct sim_finding *finding, char *out_text, size_t size);
 };
 
 /// All effects, NULL-terminated, made by the build.

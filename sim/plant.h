@@ -8,7 +8,7 @@
 
 #include <stddef.h>
 
-enum { sim_substeps = 8, sim_actuator_history = 64 };
+enum { sim_substeps = 4, sim_actuator_history = 64 };
 
 struct sim_plant {
     double position, velocity;           ///< motor

@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: MIT */
+// Delay between the torque asked for and the torque made, whole and fractional samples: bus and controller cycles.
+#include "sim/effect.h"
+#include "sim/model.h"
+
+#include <stdio.h>
+
+static bool delay_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
+{
+    static const double samples[] = {0.3, 0.7, 1.2, 1.8, 2.6, 3.6};
+    (void)coverage;
+    if (index >= sizeof samples / sizeof samples[0])
+        return false;
+    out[0] = samples[index] / model->sample_rate_hz;
+    return true;
+}
+
+static void delay_say(const struct sim_finding *f, char *out_text, size_t size)
+{
+    snprintf(out_text, size, "Torque comes %.4g +- %.2g ms after its command (dead time); the model has %.4g ms.",
+             1e3 * f->parameters[0], 1e3 * f->deviations[0], 1e3 * f->nominal[0]);
+}
+
+const struct sim_effect sim_effect_dead_time = {
+    .id = "dead_time",
+    .place = sim_place_actuator,
+    .parameter_count = 1,
+    .parameters = {{.name = "dead_time_s",
+                    .linear_name = "dead_time_s",
+                    .kind = sim_parameter_linear,
+                    .minimum = 0.0,
+                    .maximum = 0.05,
+                    .linear_minimum = 0.0,
+                    .linear_maximum = 0.05,
+                    .model_offset = offsetof(struct sim_model, dead_time_s)}},
+    .scan = delay_scan,
+    .minimum_change = 0.12,
+    .say = delay_say,
+};
