@@ -2,7 +2,9 @@
 # One function per kind of target. Sources of a room are all its .c files, so that adding an effect or a subcommand
 # is adding one file.
 
-# servoscope_room(NAME DIR [C99] LINKS...)   static library servoscope_NAME, alias servoscope::NAME
+# servoscope_room(NAME DIR [C99] LINKS...)   static library servoscope_NAME, alias servoscope::NAME, if DIR has sources.
+# C99: a room of lib/: freestanding C99 with the strict warnings; the others are hosted C11.
+# Rooms that exist are listed in the global property servoscope_rooms, topmost first, for those who link them all.
 function(servoscope_room name dir)
   cmake_parse_arguments(arg "C99" "" "LINKS;EXTRA" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${dir}/*.c)
@@ -11,16 +13,26 @@ function(servoscope_room name dir)
   endif()
   add_library(servoscope_${name} STATIC ${sources} ${arg_EXTRA})
   add_library(servoscope::${name} ALIAS servoscope_${name})
-  target_include_directories(servoscope_${name} PUBLIC ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/lib)
+  target_include_directories(servoscope_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/lib> $<INSTALL_INTERFACE:include/servoscope>)
+  set_target_properties(servoscope_${name} PROPERTIES EXPORT_NAME ${name})
   if(arg_C99)
     set_target_properties(servoscope_${name} PROPERTIES C_STANDARD 99)
-    target_link_libraries(servoscope_${name} PRIVATE servoscope_warnings_strict)
+    target_link_libraries(servoscope_${name} PRIVATE $<BUILD_INTERFACE:servoscope_warnings_strict>)
   else()
-    target_link_libraries(servoscope_${name} PRIVATE servoscope_warnings)
+    target_include_directories(servoscope_${name} PUBLIC ${PROJECT_SOURCE_DIR})
+    target_link_libraries(servoscope_${name} PRIVATE servoscope_warnings servoscope_host)
   endif()
   foreach(link ${arg_LINKS})
-    target_link_libraries(servoscope_${name} PUBLIC ${link})
+    if(link MATCHES "^servoscope_")
+      # A room without sources yet is no target; what needs it then fails to link by the name of the missing function.
+      target_link_libraries(servoscope_${name} PUBLIC $<TARGET_NAME_IF_EXISTS:${link}>)
+    else()
+      target_link_libraries(servoscope_${name} PUBLIC ${link})
+    endif()
   endforeach()
+  get_property(rooms GLOBAL PROPERTY servoscope_rooms)
+  set_property(GLOBAL PROPERTY servoscope_rooms servoscope_${name} ${rooms})
 endfunction()
 
 # servoscope_registry(OUT TYPE SYMBOL_PREFIX LIST_NAME HEADER FILES...)

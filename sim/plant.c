@@ -34,37 +34,31 @@ double sim_actuator_now(const struct sim_actuator *self, const struct sim_model 
     return held_ago(self, (size_t)ceil(fmax(model->dead_time_s * model->sample_rate_hz - rounding, 0.0)));
 }
 
-/// Integral of the held reference from the start of the current sample to `t` samples later (t < 0: before it).
-static double held_integral(const struct sim_actuator *self, double t)
+/// Moves the lag's state over `samples` of a constant input; returns the integral of the torque, in Nm samples.
+static double lagged(struct sim_actuator *self, const struct sim_model *model, double input, double samples)
 {
-    double sum = 0.0;
-    size_t ago = 0;
-    if (t >= 0.0)
-        return t * held_ago(self, 0);
-    while (t < -1.0 && ago + 2 < sim_actuator_history) {
-        ago++;
-        sum -= held_ago(self, ago);
-        t += 1.0;
+    if (!(model->torque_lag_s > 0.0)) {
+        self->torque = input;
+        return input * samples;
     }
-    return sum + t * held_ago(self, ago + 1);
+    double lag_samples = model->torque_lag_s * model->sample_rate_hz;
+    double change = (self->torque - input) * -expm1(-samples / lag_samples);
+    self->torque -= change;
+    return input * samples + change * lag_samples;
 }
 
 double sim_actuator_substep(struct sim_actuator *self, const struct sim_model *model, size_t index)
 {
+    // Samples from the start of the current one, seen through the dead time. A held value begins at every whole number, so
+    // a substep meets at most one change, and both parts of it are exact.
     double delay = model->dead_time_s * model->sample_rate_hz;
-    double from = (double)index / sim_substeps - delay;
-    double to = (double)(index + 1) / sim_substeps - delay;
-    double input = (held_integral(self, to) - held_integral(self, from)) * sim_substeps;
-    if (!(model->torque_lag_s > 0.0)) {
-        self->torque = input;
-        return input;
+    double from = (double)index / sim_substeps - delay, to = (double)(index + 1) / sim_substeps - delay;
+    double change = ceil(from);
+    if (change > from && change < to) {
+        double before = lagged(self, model, held_ago(self, (size_t)-floor(from)), change - from);
+        return sim_substeps * (before + lagged(self, model, held_ago(self, (size_t)-change), to - change));
     }
-    // First-order lag under a constant input: its mean over the substep, then its state at the end.
-    double ratio = 1.0 / (model->sample_rate_hz * sim_substeps * model->torque_lag_s);
-    double decayed = -expm1(-ratio);
-    double mean = input + (self->torque - input) * decayed / ratio;
-    self->torque += (input - self->torque) * decayed;
-    return mean;
+    return sim_substeps * lagged(self, model, held_ago(self, (size_t)-floor(from)), to - from);
 }
 
 // ---- Plant

@@ -44,7 +44,8 @@ struct run_options {
 
 /// Reads a run from a .csv or .csv.gz file (recognised by content, not by name).
 /// Checks: finite numbers in known columns, equal row lengths, strictly increasing time, rate consistent with time (the
-/// rate is the key's, else the inverse of the median time step), periods that fit the rows, bins below half the period.
+/// rate is the option's, and time is not judged then, else the key's, else the inverse of the mean time step; a gap
+/// is refused), periods that fit the rows, bins below half the period.
 /// Errors: error_refused with file, line, column, value and expectation; *out_run is empty then.
 int run_read(const char *path, const struct run_options *options, struct run *out_run, struct error *out_error);
 

@@ -20,17 +20,17 @@ static void cogging_oppose(const double *p, const struct sim_motion *motion, str
     io_opposing->smooth += p[0] * cos(phase_rate(p[2], motion->linear) * motion->position + p[1]);
 }
 
-/// Ripple needs room to show: from 1.5 periods over the covered span up to 16.
+/// Ripple needs room to show: from 1.5 periods over the covered span, in steps that half a period at its end cannot slip
+/// through, up to 160.
 static bool cogging_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
 {
-    const double fewest = 1.5, growth = 1.17;
-    if (index >= sim_effect_scan_max)
-        return false;
+    const double fewest = 1.5, step = 0.35, most = 160.0;
+    double periods = fewest + step * (double)index;
+    double rate = turn * periods / coverage->position_span;
     out[0] = 0.01 * coverage->torque_rms;
     out[1] = 0.0;
-    double rate = turn * fewest * pow(growth, (double)index) / coverage->position_span;
     out[2] = model->linear ? turn / rate : rate;
-    return true;
+    return periods <= most;
 }
 
 static bool cogging_testable(const double *p, const struct sim_coverage *coverage, char *out_why, size_t size)

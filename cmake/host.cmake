@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+# The host side: everything above lib/. Included by the root's CMakeLists.txt, so that paths and scope are the root's.
+enable_language(CXX)
+set(CMAKE_CXX_STANDARD 17)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+
+find_package(ZLIB REQUIRED)
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(CJSON REQUIRED IMPORTED_TARGET libcjson)
+pkg_check_modules(LAPACKE REQUIRED IMPORTED_TARGET lapacke)
+
+servoscope_room(drivers drivers LINKS servoscope_lib)
+servoscope_room(can drivers/can LINKS servoscope_drivers servoscope_lib)
+servoscope_room(modbus drivers/modbus LINKS servoscope_drivers servoscope_lib)
+servoscope_room(ports ports LINKS servoscope_can servoscope_modbus)
+
+file(GLOB effect_files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/sim/effects/*.c)
+servoscope_registry(${PROJECT_BINARY_DIR}/generated/effects.c "struct sim_effect" sim_effect_ sim_effects "sim/effect.h"
+  ${effect_files})
+servoscope_room(sim sim EXTRA ${effect_files} ${PROJECT_BINARY_DIR}/generated/effects.c LINKS servoscope_core m)
+servoscope_room(node sim/node LINKS servoscope_sim servoscope_can servoscope_modbus servoscope_lib)
+
+servoscope_room(page lab/page LINKS m)
+servoscope_room(numeric lab/numeric EXTRA ${PROJECT_SOURCE_DIR}/lab/numeric/fft.cpp LINKS PkgConfig::LAPACKE m)
+servoscope_room(record lab/record LINKS servoscope_sim servoscope_lib servoscope_page PkgConfig::CJSON ZLIB::ZLIB m)
+servoscope_room(measure lab/measure LINKS servoscope_record servoscope_drivers servoscope_lib servoscope_page)
+servoscope_room(estimate lab/estimate LINKS servoscope_numeric servoscope_record servoscope_page)
+servoscope_room(design lab/design LINKS servoscope_numeric servoscope_record servoscope_sim servoscope_page)
+servoscope_room(diagnose lab/diagnose
+  LINKS servoscope_sim servoscope_estimate servoscope_numeric servoscope_record servoscope_page)
+servoscope_room(experiment lab/experiment LINKS servoscope_design servoscope_diagnose servoscope_numeric servoscope_page)
+servoscope_room(tune lab/tune LINKS servoscope_estimate servoscope_numeric servoscope_record servoscope_page)
+
+file(GLOB command_files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tools/servoscope/cmd_*.c)
+if(command_files)
+  file(GLOB tool_files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tools/servoscope/*.c)
+  servoscope_registry(${PROJECT_BINARY_DIR}/generated/commands.c "struct command" command_ commands
+    "tools/servoscope/command.h" ${command_files})
+  add_executable(servoscope ${tool_files} ${PROJECT_BINARY_DIR}/generated/commands.c)
+  get_property(rooms GLOBAL PROPERTY servoscope_rooms)
+  target_include_directories(servoscope PRIVATE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/lib)
+  target_compile_definitions(servoscope PRIVATE SERVOSCOPE_VERSION="${PROJECT_VERSION}")
+  target_link_libraries(servoscope PRIVATE ${rooms} servoscope_warnings servoscope_host)
+  set_target_properties(servoscope PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR})
+  install(TARGETS servoscope)
+endif()

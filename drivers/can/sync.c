@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: MIT */
+#include "drivers/can/sync.h"
+
+#include "drivers/can/can_port.h"
+
+static uint8_t successor(uint8_t counter, uint8_t overflow)
+{
+    return counter >= overflow ? 1 : (uint8_t)(counter + 1);
+}
+
+uint8_t sync_producer_upcoming(const struct sync_producer *self)
+{
+    return self->overflow == 0 ? 0 : successor(self->counter, self->overflow);
+}
+
+struct can_frame sync_producer_next(struct sync_producer *self)
+{
+    struct can_frame frame = can_frame_make(sync_cob_id, self->overflow == 0 ? 0 : 1);
+    self->counter = sync_producer_upcoming(self);
+    frame.data[0] = self->counter;
+    return frame;
+}
+
+void sync_consumer_restart(struct sync_consumer *self)
+{
+    self->counter = 0;
+    self->running = false;
+}
+
+enum sync_result sync_consumer_take(struct sync_consumer *self, const struct can_frame *frame, uint64_t now_us)
+{
+    if (frame->id != sync_cob_id || frame->remote)
+        return sync_none;
+    if (frame->length != (self->overflow == 0 ? 0 : 1)) {
+        self->malformed++;
+        return sync_malformed;
+    }
+    uint8_t before = self->counter;
+    bool first = !self->running;
+    if (!first && self->overflow != 0 && frame->data[0] == before) {
+        self->repeated++;
+        return sync_repeated;
+    }
+    self->counter = frame->data[0];
+    self->running = true;
+    self->last_us = now_us;
+    if (self->overflow == 0 || first || self->counter == successor(before, self->overflow))
+        return sync_taken;
+    self->missed += ((uint32_t)self->counter + 2u * self->overflow - before - 1u) % self->overflow;
+    return sync_gap;
+}
+
+uint64_t sync_consumer_deadline_us(const struct sync_consumer *self)
+{
+    if (!self->running || self->period_us == 0)
+        return CAN_NEVER_US;
+    return self->last_us + self->period_us + self->period_us / 2;
+}
+
+bool sync_consumer_expired(struct sync_consumer *self, uint64_t now_us)
+{
+    if (now_us < sync_consumer_deadline_us(self))
+        return false;
+    self->running = false;
+    return true;
+}

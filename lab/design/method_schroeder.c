@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/design/method.h"
+#include "lab/design/phases.h"
+
+static int run(const struct design_request *request, struct design_search *search, struct error *out_error)
+{
+    (void)request;
+    (void)out_error;
+    design_phases_schroeder(search->spectrum, search->best);
+    return 0;
+}
+
+const struct design_method design_method_schroeder = {
+    .name = "schroeder",
+    .summary = "Schroeder's phases for the torque's power spectrum, not optimised",
+    .iterations = 0,
+    .run = run,
+};

@@ -1,0 +1,198 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/diagnose/blackbox.h"
+
+#include "lab/numeric/least_squares.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    speed_knots = 7,     // per direction
+    position_knots = 11, // over the covered span
+    direction_knots = 5,
+    filter_taps = 6,
+};
+
+static const size_t group_sizes[blackbox_groups] = {2 * speed_knots, position_knots, direction_knots, 2 * filter_taps + 3};
+
+const char *blackbox_group_name(enum blackbox_group group)
+{
+    static const char *const names[blackbox_groups] = {"a function of speed", "a function of position",
+                                                       "friction that changes with position", "a linear filter or a gain"};
+    return names[group];
+}
+
+/// Expected size of a filter tap the model lacks, as a share of the torque.
+static const double tap_deviation = 0.03;
+
+/// Triangular basis function number `knot` of `count` over 0..1.
+static double hat(double u, size_t knot, size_t count)
+{
+    return fmax(0.0, 1.0 - fabs(u * (double)(count - 1) - (double)knot));
+}
+
+/// Speeds are dense near zero, so knots are: u = sqrt(|v| / peak).
+static double speed_function(const struct recording *r, double v, size_t index)
+{
+    bool negative = index >= speed_knots;
+    if ((v < 0.0) != negative)
+        return 0.0;
+    double u = sqrt(fmin(fabs(v) / r->coverage.velocity_peak, 1.0));
+    return hat(u, index % speed_knots, speed_knots);
+}
+
+static double position_function(const struct recording *r, double low, double x, size_t index, size_t knots)
+{
+    return hat((x - low) / r->coverage.position_span, index, knots);
+}
+
+static const double *driving_signal(const struct recording *r)
+{
+    return r->block.torque_ref ? r->block.torque_ref : r->block.torque;
+}
+
+static size_t back(const struct recording *r, size_t n, size_t steps)
+{
+    size_t samples = r->block.samples;
+    if (n >= steps)
+        return n - steps;
+    return r->periodic ? n + samples - steps : 0;
+}
+
+/// Filter regressor number `index` at sample n: taps of the torque, taps of the change of speed, on either channel.
+static void filter_function(const struct recording *r, size_t n, size_t index, double *out_mechanics, double *out_actuator)
+{
+    const double *u = driving_signal(r);
+    double torque = u[n], scale = 1.0 / r->coverage.torque_rms;
+    *out_mechanics = *out_actuator = 0.0;
+    if (index < filter_taps)
+        *out_mechanics = u[back(r, n, index)];
+    else if (index < 2 * filter_taps)
+        *out_actuator = u[back(r, n, index - filter_taps)];
+    else if (index == 2 * filter_taps)
+        *out_mechanics = torque * torque * torque * scale * scale;
+    else if (index == 2 * filter_taps + 1)
+        *out_actuator = torque * torque * torque * scale * scale;
+    else
+        *out_mechanics = r->block.position[n];
+}
+
+struct builder {
+    const struct recording *r;
+    double low;
+};
+
+static void regressor(const struct builder *b, enum blackbox_group group, size_t index, size_t n, double *out_mechanics,
+                      double *out_actuator)
+{
+    const struct recording *r = b->r;
+    size_t last = r->block.samples - 1, next = n < last ? n + 1 : r->periodic ? 0 : last;
+    double v = 0.5 * (r->block.velocity[n] + r->block.velocity[next]);
+    double x = r->block.position[n];
+    *out_actuator = 0.0;
+    switch (group) {
+    case blackbox_speed:
+        *out_mechanics = speed_function(r, v, index);
+        break;
+    case blackbox_position:
+        *out_mechanics = position_function(r, b->low, x, index, position_knots);
+        break;
+    case blackbox_direction:
+        *out_mechanics = (v > 0.0 ? 1.0 : -1.0) * position_function(r, b->low, x, index, direction_knots);
+        break;
+    case blackbox_filter:
+    case blackbox_groups:
+        filter_function(r, n, index, out_mechanics, out_actuator);
+        break;
+    }
+}
+
+static bool build_run(const struct blackbox *self, const struct evidence *evidence, size_t values, size_t offset)
+{
+    const struct recording *r = evidence->recording;
+    size_t samples = r->block.samples;
+    double *signal = malloc(2 * samples * sizeof *signal);
+    if (!signal)
+        return false;
+    struct builder b = {.r = r, .low = r->block.position[0]};
+    for (size_t n = 0; n < samples; n++)
+        b.low = fmin(b.low, r->block.position[n]);
+    for (int group = 0; group < blackbox_groups; group++)
+        for (size_t i = 0; i < group_sizes[group]; i++) {
+            for (size_t n = 0; n < samples; n++)
+                regressor(&b, (enum blackbox_group)group, i, n, &signal[n], &signal[samples + n]);
+            evidence_whiten(evidence, signal, signal + samples, self->matrix + (self->group_begin[group] + i) * values + offset);
+        }
+    free(signal);
+    return true;
+}
+
+bool blackbox_init(struct blackbox *self, const struct fit_data *data)
+{
+    memset(self, 0, sizeof *self);
+    for (int group = 0; group < blackbox_groups; group++)
+        self->group_begin[group + 1] = self->group_begin[group] + group_sizes[group];
+    self->columns = self->group_begin[blackbox_groups];
+    self->matrix = malloc(self->columns * data->values * sizeof(double));
+    size_t offset = 0;
+    for (size_t i = 0; self->matrix && i < data->runs; i++) {
+        if (!build_run(self, &data->evidence[i], data->values, offset)) {
+            blackbox_free(self);
+            return false;
+        }
+        offset += data->evidence[i].values;
+    }
+    return self->matrix != NULL;
+}
+
+void blackbox_free(struct blackbox *self)
+{
+    free(self->matrix);
+    memset(self, 0, sizeof *self);
+}
+
+double blackbox_gain(const struct blackbox *self, const struct fit_data *data, const struct hypothesis *hypothesis,
+                     const struct fit *fit, unsigned mask, double *out_cost)
+{
+    size_t rows = data->values, most = self->columns + hypothesis->count, m = hypothesis->count;
+    double *A = malloc((rows * most + rows + 3 * most) * sizeof *A);
+    if (out_cost)
+        *out_cost = fit->cost;
+    if (!A)
+        return 0.0;
+    double *b = A + rows * most, *weight = b + rows, *centre = weight + most, *x = centre + most;
+    memcpy(A, fit->jacobian, rows * m * sizeof *A);
+    for (size_t i = 0; i < m; i++) {
+        weight[i] = hypothesis->coordinates[i].weight;
+        centre[i] = hypothesis->coordinates[i].centre - hypothesis->x[i];
+    }
+    for (int group = 0; group < blackbox_groups; group++)
+        for (size_t i = self->group_begin[group]; (mask >> group & 1) && i < self->group_begin[group + 1]; i++, m++) {
+            double norm = 0.0;
+            memcpy(A + rows * m, self->matrix + rows * i, rows * sizeof *A);
+            for (size_t j = 0; j < rows; j++)
+                norm += A[rows * m + j] * A[rows * m + j];
+            // Groups overlap (constants, slopes), hence a ridge. Taps of the torque get a real prior: torque and motion
+            // together could otherwise rebuild the residual itself, noise and all, as minus one times the model.
+            weight[m] = fmax(1e-4 * sqrt(norm), group == blackbox_filter ? 1.0 / tap_deviation : 0.0);
+            centre[m] = 0.0;
+        }
+    for (size_t j = 0; j < rows; j++)
+        b[j] = -fit->residual[j];
+    double cost = fit->cost;
+    if (least_squares_solve(rows, m, A, b, weight, centre, x, NULL)) {
+        cost = 0.0;
+        for (size_t i = 0; i < m; i++) {
+            cost += weight[i] * weight[i] * (x[i] - centre[i]) * (x[i] - centre[i]);
+            for (size_t j = 0; j < rows; j++)
+                b[j] -= A[rows * i + j] * x[i];
+        }
+        for (size_t j = 0; j < rows; j++)
+            cost += b[j] * b[j];
+    }
+    free(A);
+    if (out_cost)
+        *out_cost = cost;
+    return 0.5 * (fit->cost - cost);
+}

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: MIT */
+/// A black box beside the model: any smooth function of speed, of position, of position for each direction, and any short
+/// linear filter. It names nothing; what it still finds in the residual is what the named causes do not explain.
+#ifndef SERVOSCOPE_DIAGNOSE_BLACKBOX_H
+#define SERVOSCOPE_DIAGNOSE_BLACKBOX_H
+
+#include "lab/diagnose/fit.h"
+
+enum blackbox_group {
+    blackbox_speed,     ///< functions of speed, each direction on its own
+    blackbox_position,  ///< functions of position
+    blackbox_direction, ///< functions of position that change sign with the direction of motion
+    blackbox_filter,    ///< linear in torque and motion of the last samples, and the torque's cube
+    blackbox_groups,
+};
+
+struct blackbox {
+    size_t columns;
+    size_t group_begin[blackbox_groups + 1]; ///< columns of a group lie together
+    double *matrix;                          ///< whitened: data->values x columns
+};
+
+/// Builds the whitened regressors on all runs. Errors: false if memory is short.
+bool blackbox_init(struct blackbox *self, const struct fit_data *data);
+void blackbox_free(struct blackbox *self);
+
+/// Gain in nats of letting the groups in `mask` (bit per group) and the hypothesis' own parameters move, over the fit as it is.
+/// out_cost: the cost that is left, NULL: not wanted. Errors: 0 and the old cost if memory is short.
+double blackbox_gain(const struct blackbox *self, const struct fit_data *data, const struct hypothesis *hypothesis,
+                     const struct fit *fit, unsigned mask, double *out_cost);
+
+const char *blackbox_group_name(enum blackbox_group group);
+
+#endif

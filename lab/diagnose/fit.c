@@ -1,0 +1,228 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/diagnose/fit.h"
+
+#include "lab/numeric/least_squares.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+bool fit_init(struct fit *self, const struct fit_data *data)
+{
+    memset(self, 0, sizeof *self);
+    size_t most = hypothesis_coordinates_max;
+    self->residual = malloc(data->values * sizeof(double));
+    self->jacobian = malloc(data->values * most * sizeof(double));
+    self->covariance = malloc(most * most * sizeof(double));
+    if (self->residual && self->jacobian && self->covariance)
+        return true;
+    fit_free(self);
+    return false;
+}
+
+void fit_free(struct fit *self)
+{
+    free(self->residual);
+    free(self->jacobian);
+    free(self->covariance);
+    memset(self, 0, sizeof *self);
+}
+
+void fit_residual(const struct fit_data *data, const struct sim_model *model, double *out_residual)
+{
+    for (size_t i = 0; i < data->runs; i++) {
+        evidence_residual(&data->evidence[i], model, out_residual);
+        out_residual += data->evidence[i].values;
+    }
+}
+
+static double prior_cost(const struct hypothesis *h, const double *x)
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < h->count; i++) {
+        double d = h->coordinates[i].weight * (x[i] - h->coordinates[i].centre);
+        sum += d * d;
+    }
+    return sum;
+}
+
+static double sum_of_squares(size_t n, const double *r)
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < n; i++)
+        sum += r[i] * r[i];
+    return sum;
+}
+
+static double residual_at(const struct fit_data *data, const struct hypothesis *h, const double *x, double *out_residual)
+{
+    struct sim_model model;
+    hypothesis_model(h, x, &model);
+    fit_residual(data, &model, out_residual);
+    double sum = sum_of_squares(data->values, out_residual);
+    return isfinite(sum) ? sum + prior_cost(h, x) : INFINITY;
+}
+
+double fit_cost(struct fit *self, const struct fit_data *data, const struct hypothesis *hypothesis, const double *x)
+{
+    self->cost = residual_at(data, hypothesis, x, self->residual);
+    self->prior = prior_cost(hypothesis, x);
+    return self->cost;
+}
+
+/// One-sided differences, away from the nearer bound. The residual is nearly linear in most coordinates, so that a step large
+/// enough to average over the instants at which friction changes sign costs no accuracy.
+static void differentiate_by(const struct fit_data *data, const struct hypothesis *h, size_t i, const double *residual,
+                             double *out_column)
+{
+    double x[hypothesis_coordinates_max];
+    memcpy(x, h->x, sizeof x);
+    const struct coordinate *c = &h->coordinates[i];
+    double step = c->scale == coordinate_logarithmic ? 2e-4 : 1e-3 * fmax(fabs(h->x[i]), 0.3);
+    if (h->x[i] + step > c->upper)
+        step = -step;
+    x[i] += step;
+    residual_at(data, h, x, out_column);
+    for (size_t j = 0; j < data->values; j++)
+        out_column[j] = (out_column[j] - residual[j]) / step;
+}
+
+static void differentiate(struct fit *self, const struct fit_data *data, const struct hypothesis *h, const double *residual)
+{
+    for (size_t i = 0; i < h->count; i++)
+        differentiate_by(data, h, i, residual, self->jacobian + i * data->values);
+}
+
+/// Solves for the step; coordinates that would leave their box are put on its wall and the others solved again.
+static bool solve_step(const struct fit *self, const struct fit_data *data, const struct hypothesis *h, double damping,
+                       double *work, double *out_x, double *out_covariance)
+{
+    size_t n = h->count, rows = data->values;
+    bool held[hypothesis_coordinates_max] = {false};
+    double weight[hypothesis_coordinates_max], centre[hypothesis_coordinates_max], step[hypothesis_coordinates_max];
+    double *columns = work, *rhs = work + rows * n;
+    memcpy(out_x, h->x, n * sizeof *out_x);
+    for (int pass = 0; pass < 5; pass++) {
+        size_t map[hypothesis_coordinates_max], m = 0;
+        for (size_t j = 0; j < rows; j++)
+            rhs[j] = -self->residual[j];
+        for (size_t i = 0; i < n; i++) {
+            const double *column = self->jacobian + i * rows;
+            if (held[i]) {
+                for (size_t j = 0; j < rows; j++)
+                    rhs[j] -= column[j] * (out_x[i] - h->x[i]);
+                continue;
+            }
+            memcpy(columns + m * rows, column, rows * sizeof *column);
+            double prior = h->coordinates[i].weight;
+            double marquardt = damping * sum_of_squares(rows, column);
+            weight[m] = sqrt(prior * prior + marquardt);
+            centre[m] = weight[m] > 0.0 ? prior * prior * (h->coordinates[i].centre - h->x[i]) / (weight[m] * weight[m]) : 0.0;
+            map[m++] = i;
+        }
+        double covariance[hypothesis_coordinates_max * hypothesis_coordinates_max];
+        if (m == 0 || !least_squares_solve(rows, m, columns, rhs, weight, centre, step, covariance))
+            return m == 0;
+        bool again = false;
+        memset(out_covariance, 0, n * n * sizeof *out_covariance);
+        for (size_t a = 0; a < m; a++) {
+            size_t i = map[a];
+            out_x[i] = fmin(fmax(h->x[i] + step[a], h->coordinates[i].lower), h->coordinates[i].upper);
+            if (out_x[i] != h->x[i] + step[a])
+                held[i] = again = true;
+            for (size_t b = 0; b < m; b++)
+                out_covariance[i * n + map[b]] = covariance[a * m + b];
+        }
+        if (!again)
+            return true;
+    }
+    return true;
+}
+
+/// A step is finished when no coordinate moved by more than this share of its scale.
+static bool moved(const struct hypothesis *h, const double *x)
+{
+    const double small = 2e-5;
+    for (size_t i = 0; i < h->count; i++)
+        if (fabs(x[i] - h->x[i]) > small * fmax(fabs(h->x[i]), 1.0))
+            return true;
+    return false;
+}
+
+bool fit_run(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis, size_t iterations)
+{
+    struct hypothesis *h = io_hypothesis;
+    size_t rows = data->values;
+    double *work = malloc((rows * h->count + 2 * rows) * sizeof *work);
+    if (!work)
+        return false;
+    double *trial = work + rows * h->count + rows;
+    double damping = 0.0, x[hypothesis_coordinates_max];
+    bool good = true, fresh = false;
+    self->cost = residual_at(data, h, h->x, self->residual);
+    for (size_t i = 0; i <= iterations && good; i++) {
+        if (!fresh)
+            differentiate(self, data, h, self->residual);
+        fresh = true;
+        good = solve_step(self, data, h, damping, work, x, self->covariance);
+        if (!good || i == iterations || !moved(h, x))
+            break;
+        double cost = residual_at(data, h, x, trial);
+        if (cost < self->cost) {
+            bool settled = self->cost - cost < 1e-3;
+            memcpy(h->x, x, h->count * sizeof *x);
+            memcpy(self->residual, trial, rows * sizeof *trial);
+            self->cost = cost;
+            damping = damping > 1e-3 ? damping * 0.1 : 0.0;
+            fresh = false;
+            if (settled)
+                i = iterations - 1; // one more pass for derivatives and covariance at the final x
+        } else {
+            damping = damping > 0.0 ? damping * 8.0 : 1e-2;
+            if (damping > 1e4)
+                break;
+        }
+    }
+    self->prior = prior_cost(h, h->x);
+    free(work);
+    return good;
+}
+
+/// Index of the same coordinate in another hypothesis, or its count.
+static size_t find_coordinate(const struct hypothesis *h, const struct coordinate *c)
+{
+    for (size_t i = 0; i < h->count; i++) {
+        const struct coordinate *d = &h->coordinates[i];
+        if (d->effect == c->effect && d->parameter == c->parameter && d->model_offset == c->model_offset && d->unit == c->unit)
+            return i;
+    }
+    return h->count;
+}
+
+bool fit_step(struct fit *self, const struct fit_data *data, const struct hypothesis *base, const struct fit *base_fit,
+              struct hypothesis *io_trial)
+{
+    struct hypothesis *h = io_trial;
+    size_t rows = data->values;
+    double *work = malloc((rows * h->count + 2 * rows) * sizeof *work);
+    if (!work)
+        return false;
+    self->cost = residual_at(data, h, h->x, self->residual);
+    for (size_t i = 0; i < h->count; i++) {
+        size_t j = find_coordinate(base, &h->coordinates[i]);
+        double *column = self->jacobian + i * rows;
+        if (j < base->count)
+            memcpy(column, base_fit->jacobian + j * rows, rows * sizeof *column);
+        else
+            differentiate_by(data, h, i, self->residual, column);
+    }
+    double x[hypothesis_coordinates_max], *trial = work + rows * h->count + rows;
+    bool good = solve_step(self, data, h, 0.0, work, x, self->covariance);
+    double cost = good ? residual_at(data, h, x, trial) : INFINITY;
+    if (cost < self->cost) {
+        self->cost = cost;
+        memcpy(h->x, x, h->count * sizeof *x);
+    }
+    free(work);
+    return good;
+}

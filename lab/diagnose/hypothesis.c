@@ -1,0 +1,255 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/diagnose/hypothesis.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+/// How far the given model's numbers may be off without that being a cause: standard deviation and box, relative.
+struct tolerance {
+    size_t offset;
+    double deviation, box;
+};
+
+static const struct tolerance tolerances[] = {
+    {offsetof(struct sim_model, motor_inertia_kgm2), 0.01, 0.02},
+    {offsetof(struct sim_model, load_inertia_kgm2), 0.02, 0.05},
+    {offsetof(struct sim_model, belt_stiffness_Nm_per_rad), 0.03, 0.08},
+    {offsetof(struct sim_model, belt_damping_Nms_per_rad), 0.3, 1.0},
+    {offsetof(struct sim_model, viscous_friction_Nms_per_rad), 0.04, 0.10},
+    {offsetof(struct sim_model, coulomb_friction_Nm), 0.04, 0.10},
+    {offsetof(struct sim_model, torque_lag_s), 0.04, 0.10},
+    {offsetof(struct sim_model, dead_time_s), 0.04, 0.10},
+};
+
+static double field(const struct sim_model *model, size_t offset)
+{
+    double value;
+    memcpy(&value, (const char *)model + offset, sizeof value);
+    return value;
+}
+
+static void set_field(struct sim_model *model, size_t offset, double value)
+{
+    memcpy((char *)model + offset, &value, sizeof value);
+}
+
+static size_t find_offset(const struct hypothesis *self, size_t offset)
+{
+    for (size_t i = 0; i < self->count; i++)
+        if (self->coordinates[i].model_offset == offset)
+            return i;
+    return SIZE_MAX;
+}
+
+static void add_coordinate(struct hypothesis *self, struct coordinate c, double x)
+{
+    self->coordinates[self->count] = c;
+    self->x[self->count] = x;
+    self->count++;
+}
+
+static void remove_coordinate(struct hypothesis *self, size_t i)
+{
+    self->count--;
+    memmove(&self->coordinates[i], &self->coordinates[i + 1], (self->count - i) * sizeof self->coordinates[0]);
+    memmove(&self->x[i], &self->x[i + 1], (self->count - i) * sizeof self->x[0]);
+}
+
+static bool belongs_to_belt(size_t offset)
+{
+    return offset == offsetof(struct sim_model, belt_stiffness_Nm_per_rad) ||
+           offset == offsetof(struct sim_model, belt_damping_Nms_per_rad);
+}
+
+/// The few percent by which a number of the given model may be off.
+static void add_nuisance(struct hypothesis *self, const struct tolerance *t)
+{
+    const struct sim_model *m = &self->engaged;
+    double value = field(m, t->offset);
+    if (!(value > 0.0) || (belongs_to_belt(t->offset) && m->structure != sim_structure_two_mass) ||
+        find_offset(self, t->offset) != SIZE_MAX || self->count == hypothesis_coordinates_max)
+        return;
+    bool inertia = t->offset == offsetof(struct sim_model, motor_inertia_kgm2) ||
+                   t->offset == offsetof(struct sim_model, load_inertia_kgm2);
+    bool split_unknown = inertia && m->structure != self->given->structure;
+    struct coordinate c = {.effect = -1, .model_offset = t->offset, .scale = coordinate_logarithmic, .unit = value};
+    c.weight = 1.0 / t->deviation;
+    c.lower = log1p(-fmin(t->box, 0.9));
+    c.upper = log1p(t->box);
+    if (inertia && self->inertia_free) {
+        c.weight = 0.0;
+        c.lower = -40.0;
+        c.upper = 40.0;
+    } else if (split_unknown) { // a rigid model knows the sum; how it splits is for the data to say
+        c.weight = 1.0;
+        c.lower = -3.0;
+        c.upper = 3.0;
+    }
+    add_coordinate(self, c, 0.0);
+}
+
+static void add_nuisances(struct hypothesis *self)
+{
+    for (size_t i = 0; i < sizeof tolerances / sizeof tolerances[0]; i++)
+        add_nuisance(self, &tolerances[i]);
+}
+
+void hypothesis_init(struct hypothesis *self, const struct sim_model *given, bool inertia_free)
+{
+    memset(self, 0, sizeof *self);
+    self->given = given;
+    self->engaged = *given;
+    self->inertia_free = inertia_free;
+    add_nuisances(self);
+}
+
+bool hypothesis_may_name(const struct hypothesis *self, int effect)
+{
+    const struct sim_effect *e = sim_effects[effect];
+    if (self->named[effect] || self->given->effect_on[effect] ||
+        self->count + e->parameter_count + 2 > hypothesis_coordinates_max)
+        return false;
+    bool free_inertia = e->parameters[0].model_offset == offsetof(struct sim_model, load_inertia_kgm2) && self->inertia_free;
+    return !free_inertia && (!e->applies || e->applies(self->given));
+}
+
+static void name_parameter(struct hypothesis *self, int effect, size_t i, const double *values)
+{
+    const struct sim_parameter *p = &sim_effects[effect]->parameters[i];
+    bool linear = self->given->linear;
+    double low = linear ? p->linear_minimum : p->minimum, high = linear ? p->linear_maximum : p->maximum;
+    struct coordinate c = {.effect = effect, .parameter = i, .model_offset = p->model_offset, .unit = 1.0};
+    double x = 1.0;
+    switch (p->kind) {
+    case sim_parameter_linear:
+        c.scale = coordinate_linear;
+        c.unit = values[i] != 0.0 ? fabs(values[i]) : 1.0;
+        x = values[i] / c.unit;
+        c.lower = low / c.unit;
+        c.upper = high / c.unit;
+        break;
+    case sim_parameter_positive:
+        c.scale = coordinate_logarithmic;
+        c.unit = values[i];
+        x = 0.0;
+        c.lower = log(low / c.unit);
+        c.upper = log(high / c.unit);
+        break;
+    case sim_parameter_amplitude:
+        c.scale = coordinate_cosine;
+        c.unit = values[i];
+        x = cos(values[i + 1]);
+        c.lower = -high / c.unit;
+        c.upper = high / c.unit;
+        break;
+    case sim_parameter_phase:
+        c.scale = coordinate_sine;
+        c.unit = values[i - 1];
+        x = sin(values[i]);
+        high = linear ? (p - 1)->linear_maximum : (p - 1)->maximum;
+        c.lower = -high / c.unit;
+        c.upper = high / c.unit;
+        break;
+    }
+    size_t nuisance = p->model_offset != SIZE_MAX ? find_offset(self, p->model_offset) : SIZE_MAX;
+    if (nuisance != SIZE_MAX)
+        remove_coordinate(self, nuisance);
+    add_coordinate(self, c, x);
+}
+
+/// The given model with what the named effects change of its structure; values of fields come from the coordinates.
+static void rebuild_engaged(struct hypothesis *self)
+{
+    self->engaged = *self->given;
+    for (size_t e = 0; sim_effects[e]; e++) {
+        if (!self->named[e])
+            continue;
+        if (sim_effects[e]->engage)
+            sim_effects[e]->engage(&self->engaged);
+        self->engaged.effect_on[e] = sim_effects[e]->parameters[0].model_offset == SIZE_MAX;
+    }
+}
+
+void hypothesis_name(struct hypothesis *self, int effect, const double *values)
+{
+    self->named[effect] = true;
+    for (size_t i = 0; i < sim_effects[effect]->parameter_count; i++)
+        name_parameter(self, effect, i, values);
+    enum sim_structure before = self->engaged.structure;
+    rebuild_engaged(self);
+    if (self->engaged.structure != before) { // the inertias' boxes were the rigid model's
+        for (size_t i = self->count; i-- > 0;)
+            if (self->coordinates[i].effect < 0)
+                remove_coordinate(self, i);
+    }
+    add_nuisances(self);
+}
+
+void hypothesis_unname(struct hypothesis *self, int effect)
+{
+    self->named[effect] = false;
+    for (size_t i = self->count; i-- > 0;)
+        if (self->coordinates[i].effect == effect)
+            remove_coordinate(self, i);
+    rebuild_engaged(self);
+    if (sim_effects[effect]->engage)
+        for (size_t i = self->count; i-- > 0;)
+            if (self->coordinates[i].effect < 0)
+                remove_coordinate(self, i);
+    add_nuisances(self);
+}
+
+static double *parameter_place(const struct coordinate *c, struct sim_model *model)
+{
+    return &model->effect_parameters[c->effect][c->parameter];
+}
+
+void hypothesis_model(const struct hypothesis *self, const double *x, struct sim_model *out_model)
+{
+    if (!x)
+        x = self->x;
+    *out_model = self->engaged;
+    for (size_t i = 0; i < self->count; i++) {
+        const struct coordinate *c = &self->coordinates[i];
+        double value = c->unit * (c->scale == coordinate_logarithmic ? exp(x[i]) : x[i]);
+        if (c->scale == coordinate_sine)
+            continue; // set together with its cosine part
+        if (c->scale == coordinate_cosine) {
+            *parameter_place(c, out_model) = hypot(value, c->unit * x[i + 1]);
+            *(parameter_place(c, out_model) + 1) = atan2(x[i + 1], x[i]);
+        } else if (c->model_offset != SIZE_MAX) {
+            set_field(out_model, c->model_offset, value);
+        } else {
+            *parameter_place(c, out_model) = value;
+        }
+    }
+}
+
+void hypothesis_parameters(const struct hypothesis *self, int effect, const double *covariance, double *out_values,
+                           double *out_deviations)
+{
+    struct sim_model model;
+    hypothesis_model(self, NULL, &model);
+    size_t n = self->count;
+    for (size_t i = 0; i < n; i++) {
+        const struct coordinate *c = &self->coordinates[i];
+        if (c->effect != effect)
+            continue;
+        double value = c->model_offset != SIZE_MAX ? field(&model, c->model_offset) : *parameter_place(c, &model);
+        out_values[c->parameter] = value;
+        if (!covariance)
+            continue;
+        double variance = covariance[i * n + i];
+        if (c->scale == coordinate_cosine || c->scale == coordinate_sine) {
+            size_t j = c->scale == coordinate_cosine ? i : i - 1;
+            double xc = self->x[j], xs = self->x[j + 1], size = hypot(xc, xs);
+            double cc = covariance[j * n + j], ss = covariance[(j + 1) * n + j + 1], cs = covariance[j * n + j + 1];
+            double along = (xc * xc * cc + xs * xs * ss + 2 * xc * xs * cs) / (size * size);
+            double across = (xs * xs * cc + xc * xc * ss - 2 * xc * xs * cs) / (size * size);
+            out_deviations[c->parameter] = c->scale == coordinate_cosine ? c->unit * sqrt(along) : sqrt(across) / size;
+        } else {
+            out_deviations[c->parameter] = sqrt(variance) * (c->scale == coordinate_logarithmic ? value : c->unit);
+        }
+    }
+}

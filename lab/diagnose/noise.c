@@ -1,0 +1,226 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/diagnose/noise.h"
+
+#include "lab/diagnose/predict.h"
+#include "lab/numeric/fft.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double pi = 3.14159265358979324;
+
+bool evidence_init(struct evidence *self, const struct recording *recording, double scale_inertia)
+{
+    memset(self, 0, sizeof *self);
+    self->recording = recording;
+    self->scale_inertia = scale_inertia;
+    self->channels = recording->block.torque_ref ? 2 : 1;
+    size_t n = recording->block.samples, bins = recording->band + 1;
+    self->values = self->channels * (2 * recording->band) + 1; // the constant part: mechanics only
+    self->plan = fft_plan_create(n);
+    self->covariance = calloc(4 * bins, sizeof(double));
+    self->factor = calloc(4 * bins, sizeof(double));
+    self->work = malloc((4 * n + 2 * n + 4 * bins) * sizeof(double));
+    if (self->plan && self->covariance && self->factor && self->work)
+        return true;
+    evidence_free(self);
+    return false;
+}
+
+void evidence_free(struct evidence *self)
+{
+    if (self->plan)
+        fft_plan_destroy(self->plan);
+    free(self->covariance);
+    free(self->factor);
+    free(self->work);
+    memset(self, 0, sizeof *self);
+}
+
+/// Cosine taper over a twentieth at each end: keeps the ends of a run without periods from leaking into every bin.
+static double taper(const struct recording *r, size_t i)
+{
+    size_t n = r->block.samples, edge = n / 20;
+    size_t from_end = i < n - 1 - i ? i : n - 1 - i;
+    if (r->periodic || from_end >= edge)
+        return 1.0;
+    return 0.5 - 0.5 * cos(pi * ((double)from_end + 0.5) / (double)edge);
+}
+
+void evidence_transform(const struct evidence *self, const double *signal, double *out_spectrum)
+{
+    const struct recording *r = self->recording;
+    size_t n = r->block.samples;
+    double *in = self->work, *out = in + 2 * n;
+    for (size_t i = 0; i < n; i++) {
+        in[2 * i] = signal[i] * taper(r, i);
+        in[2 * i + 1] = 0.0;
+    }
+    fft_forward(self->plan, in, out);
+    for (size_t i = 0; i < 2 * (r->band + 1); i++)
+        out_spectrum[i] = out[i] / (double)n;
+}
+
+/// Adds weight * (m, a) (m, a)^H to the raw covariance of one bin.
+static void accumulate(double *c, const double *m, const double *a, double weight)
+{
+    c[0] += weight * (m[0] * m[0] + m[1] * m[1]);
+    if (!a)
+        return;
+    c[1] += weight * (a[0] * a[0] + a[1] * a[1]);
+    c[2] += weight * (a[0] * m[0] + a[1] * m[1]);
+    c[3] += weight * (a[1] * m[0] - a[0] * m[1]);
+}
+
+/// Mean over neighbours; the number of neighbours grows with frequency in a run without periods, where lines are dense.
+static void smooth(const struct evidence *self, const double *raw)
+{
+    size_t band = self->recording->band;
+    for (size_t k = 0; k <= band; k++) {
+        size_t reach = self->recording->periodic ? 10 : 15 + k / 5;
+        // Bin 0 is real: its variance is that of a complex neighbour, so it is left out of the others' means.
+        size_t from = k > reach ? k - reach : 1, to = k + reach < band ? k + reach : band;
+        for (size_t j = 0; j < 4; j++) {
+            double sum = 0.0;
+            for (size_t i = from; i <= to; i++)
+                sum += raw[4 * i + j];
+            self->covariance[4 * k + j] = sum / (double)(to - from + 1);
+        }
+    }
+}
+
+/// Inverse Cholesky factor per bin, for real and imaginary parts of unit variance (hence half the complex variance each).
+static void factorise(const struct evidence *self)
+{
+    for (size_t k = 0; k <= self->recording->band; k++) {
+        const double *c = self->covariance + 4 * k;
+        double *f = self->factor + 4 * k;
+        double part = k == 0 ? 1.0 : 0.5;
+        double mm = fmax(part * c[0], 1e-300);
+        f[0] = 1.0 / sqrt(mm);
+        if (self->channels == 1)
+            continue;
+        double re = c[2] / fmax(c[0], 1e-300), im = c[3] / fmax(c[0], 1e-300);
+        double rest = fmax(part * c[1] - part * c[0] * (re * re + im * im), 1e-9 * part * c[1] + 1e-300);
+        f[1] = 1.0 / sqrt(rest);
+        f[2] = -re * f[1];
+        f[3] = -im * f[1];
+    }
+}
+
+/// Residual signals of every row of a periodic run: the periods and what leads into them.
+static double *residuals_of_all(const struct evidence *self, const struct sim_model *model)
+{
+    size_t rows = self->recording->all.samples;
+    double *both = malloc(2 * rows * sizeof *both);
+    if (both)
+        predict(model, &self->recording->all, false, self->scale_inertia, both, both + rows);
+    return both;
+}
+
+static void scatter_of_periods(const struct evidence *self, const double *both, double *spectra, double *raw)
+{
+    const struct recording *r = self->recording;
+    size_t n = r->block.samples, bins = r->band + 1, rows = r->all.samples, P = r->periods;
+    double *mean = spectra + P * 4 * bins;
+    memset(mean, 0, 4 * bins * sizeof *mean);
+    for (size_t p = 0; p < P; p++) {
+        double *m = spectra + p * 4 * bins;
+        evidence_transform(self, both + r->lead + p * n, m);
+        evidence_transform(self, both + rows + r->lead + p * n, m + 2 * bins);
+        for (size_t i = 0; i < 4 * bins; i++)
+            mean[i] += m[i] / (double)P;
+    }
+    for (size_t p = 0; p < P; p++) {
+        double *m = spectra + p * 4 * bins;
+        for (size_t i = 0; i < 4 * bins; i++)
+            m[i] -= mean[i];
+        for (size_t k = 0; k < bins; k++)
+            accumulate(raw + 4 * k, m + 2 * k, self->channels == 2 ? m + 2 * bins + 2 * k : NULL,
+                       1.0 / ((double)P * (double)(P - 1)));
+    }
+}
+
+static bool noise_from_periods(const struct evidence *self, const struct sim_model *model, double *raw)
+{
+    const struct recording *r = self->recording;
+    double *both = residuals_of_all(self, model);
+    double *spectra = malloc((r->periods + 1) * 4 * (r->band + 1) * sizeof *spectra);
+    bool good = both && spectra;
+    if (good)
+        scatter_of_periods(self, both, spectra, raw);
+    free(both);
+    free(spectra);
+    return good;
+}
+
+static bool noise_from_residual(const struct evidence *self, const struct sim_model *model, const double *removed, double *raw)
+{
+    const struct recording *r = self->recording;
+    size_t n = r->block.samples, bins = r->band + 1;
+    double *both = malloc((2 * n + 4 * bins) * sizeof *both);
+    if (!both)
+        return false;
+    predict(model, &r->block, false, self->scale_inertia, both, both + n);
+    for (size_t i = 0; removed && i < n; i++)
+        both[i] -= removed[i];
+    double *m = both + 2 * n;
+    evidence_transform(self, both, m);
+    evidence_transform(self, both + n, m + 2 * bins);
+    for (size_t k = 0; k < bins; k++)
+        accumulate(raw + 4 * k, m + 2 * k, self->channels == 2 ? m + 2 * bins + 2 * k : NULL, 1.0);
+    free(both);
+    return true;
+}
+
+bool evidence_estimate_noise(struct evidence *self, const struct sim_model *model, const double *removed)
+{
+    double *raw = calloc(4 * (self->recording->band + 1), sizeof *raw);
+    bool good = raw && (self->recording->periodic ? noise_from_periods(self, model, raw)
+                                                  : noise_from_residual(self, model, removed, raw));
+    if (good) {
+        smooth(self, raw);
+        factorise(self);
+    }
+    free(raw);
+    return good;
+}
+
+void evidence_whiten(const struct evidence *self, const double *mechanics, const double *actuator, double *out_whitened)
+{
+    const struct recording *r = self->recording;
+    size_t bins = r->band + 1, n = r->block.samples;
+    double *m = self->work + 6 * n, *a = m + 2 * bins, *w = out_whitened;
+    evidence_transform(self, mechanics, m);
+    if (actuator && self->channels == 2)
+        evidence_transform(self, actuator, a);
+    else
+        memset(a, 0, 2 * bins * sizeof *a);
+    *w++ = self->factor[0] * m[0];
+    for (size_t k = 1; k < bins; k++) {
+        const double *f = self->factor + 4 * k, *mk = m + 2 * k, *ak = a + 2 * k;
+        *w++ = f[0] * mk[0];
+        *w++ = f[0] * mk[1];
+        if (self->channels == 1)
+            continue;
+        *w++ = f[1] * ak[0] + f[2] * mk[0] - f[3] * mk[1];
+        *w++ = f[1] * ak[1] + f[2] * mk[1] + f[3] * mk[0];
+    }
+}
+
+void evidence_residual(const struct evidence *self, const struct sim_model *model, double *out_whitened)
+{
+    const struct recording *r = self->recording;
+    double *mechanics = self->work + 4 * r->block.samples;
+    double *actuator = self->channels == 2 ? mechanics + r->block.samples : NULL;
+    predict(model, &r->block, r->periodic, self->scale_inertia, mechanics, actuator);
+    evidence_whiten(self, mechanics, actuator, out_whitened);
+}
+
+size_t evidence_bin(const struct evidence *self, size_t i, size_t *out_channel)
+{
+    size_t width = 2 * self->channels;
+    *out_channel = i == 0 ? 0 : (i - 1) % width / 2;
+    return i == 0 ? 0 : 1 + (i - 1) / width;
+}

@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: MIT */
+/// The noise of a recording as the residuals see it, estimated from the recording, and residuals whitened by it.
+#ifndef SERVOSCOPE_DIAGNOSE_NOISE_H
+#define SERVOSCOPE_DIAGNOSE_NOISE_H
+
+#include "lab/diagnose/recording.h"
+#include "sim/model.h"
+
+struct fft_plan;
+
+/// A recording with its noise: what a likelihood needs. Channels: mechanics, and actuator if there is a reference.
+struct evidence {
+    const struct recording *recording;
+    double scale_inertia;   ///< of predict(); the same for every model that is compared
+    size_t channels;        ///< 1 or 2
+    size_t values;          ///< length of a whitened residual
+    struct fft_plan *plan;
+    double *covariance;     ///< per bin 0..band: S_mm, S_aa, Re S_am, Im S_am of the block's DFT divided by its length
+    double *factor;         ///< per bin: inverse Cholesky factor, l_mm, l_aa, Re l_am, Im l_am
+    double *work;
+};
+
+/// Prepares the evidence for a recording. Errors: false if memory is short.
+bool evidence_init(struct evidence *self, const struct recording *recording, double scale_inertia);
+void evidence_free(struct evidence *self);
+
+/// Estimates the noise under a model: from the scatter of the periods' residuals about their mean, averaged over neighbouring
+/// bins; in a run without periods from the smoothed spectrum of the residual itself, `removed` subtracted from it first
+/// (mechanics, block length; NULL: nothing), so that it is then an upper bound.
+/// Equation:  C_k = 1 / (P (P-1)) sum_p (R_p - mean) (R_p - mean)^H, smoothed;  R = DFT / N
+/// Errors: false if memory is short.
+bool evidence_estimate_noise(struct evidence *self, const struct sim_model *model, const double *removed);
+
+/// Residual of a model on the block, whitened: independent, unit variance if the model is right.
+/// Shapes: out_whitened: self->values; order: bin by bin, mechanics before actuator, real before imaginary.
+void evidence_residual(const struct evidence *self, const struct sim_model *model, double *out_whitened);
+
+/// Whitens residual signals of the block (actuator NULL: zeros).
+void evidence_whiten(const struct evidence *self, const double *mechanics, const double *actuator, double *out_whitened);
+
+/// DFT of one real signal of the block at bins 0..band, divided by its length, tapered if the block is no period;
+/// out: 2 (band + 1) values.
+void evidence_transform(const struct evidence *self, const double *signal, double *out_spectrum);
+
+/// Bin that value number i of a whitened residual belongs to, and its channel.
+size_t evidence_bin(const struct evidence *self, size_t i, size_t *out_channel);
+
+#endif

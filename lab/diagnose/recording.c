@@ -1,0 +1,235 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/diagnose/recording.h"
+
+#include "lab/diagnose/motion.h"
+#include "lab/numeric/fft.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void stretch_free(struct stretch *s)
+{
+    free(s->torque_ref);
+    free(s->torque);
+    free(s->position);
+    free(s->velocity);
+}
+
+void recording_free(struct recording *self)
+{
+    stretch_free(&self->block);
+    stretch_free(&self->all);
+    free(self->bins);
+    memset(self, 0, sizeof *self);
+}
+
+static double *copied(const double *data, size_t count)
+{
+    double *copy = malloc(count * sizeof *copy);
+    if (copy)
+        memcpy(copy, data, count * sizeof *copy);
+    return copy;
+}
+
+static const double *either(const struct run *run, const char *rotary, const char *linear)
+{
+    return run_column(run, run->linear ? linear : rotary);
+}
+
+static int refuse_column(const struct run *run, const char *what, const char *rotary, const char *linear,
+                         struct error *out_error)
+{
+    return error_set(out_error, error_refused, "%s: no %s: a column %s (or %s on a linear axis) is needed; --map can name one",
+                     run->path ? run->path : "run", what, rotary, linear);
+}
+
+static int take_columns(const struct run *run, struct recording *r, struct error *out_error)
+{
+    const double *torque = either(run, "torque_Nm", "force_N");
+    const double *reference = either(run, "torque_ref_Nm", "force_ref_N");
+    const double *position = either(run, "position_rad", "position_m");
+    const double *velocity = either(run, "velocity_rad_per_s", "velocity_m_per_s");
+    if (!torque)
+        return refuse_column(run, "torque", "torque_Nm", "force_N", out_error);
+    if (!position && !velocity)
+        return refuse_column(run, "motion", "position_rad", "position_m", out_error);
+    size_t rows = run->rows;
+    r->all.samples = rows;
+    r->all.torque = copied(torque, rows);
+    r->all.torque_ref = reference ? copied(reference, rows) : NULL;
+    r->all.position = malloc(rows * sizeof(double));
+    r->all.velocity = malloc(rows * sizeof(double));
+    if (!r->all.torque || (reference && !r->all.torque_ref) || !r->all.position || !r->all.velocity ||
+        !motion_estimate(rows, run->sample_rate_hz, position, velocity, r->periodic ? run->period_samples : 0, &r->all,
+                         r->motion_from, sizeof r->motion_from))
+        return error_set(out_error, error_refused, "%s: not enough memory for %zu rows", run->path, rows);
+    return 0;
+}
+
+/// Periods that count: after the settling ones and, unless the file says how many settled, after the first.
+static void choose_periods(const struct run *run, struct recording *r)
+{
+    size_t n = run->period_samples;
+    r->periodic = n >= 16 && run->rows >= 3 * n;
+    if (!r->periodic)
+        return;
+    size_t available = run->rows / n;
+    size_t settle = run->has_settle_periods ? run->settle_periods : 0;
+    if (settle == 0 && available >= 3)
+        settle = 1; // the first period holds the start transient
+    if (settle + 2 > available)
+        settle = available - 2;
+    r->lead = settle * n;
+    r->periods = available - settle;
+    if (run->periods > 1 && run->periods < r->periods && run->has_settle_periods)
+        r->periods = run->periods;
+}
+
+/// Mean over the counted periods; the whole run, cut to a length that transforms fast, if there are none.
+static bool average(const double *all, size_t lead, size_t n, size_t periods, double **out_mean)
+{
+    *out_mean = NULL;
+    if (!all)
+        return true;
+    double *mean = calloc(n, sizeof *mean);
+    if (!mean)
+        return false;
+    for (size_t p = 0; p < periods; p++)
+        for (size_t i = 0; i < n; i++)
+            mean[i] += all[lead + p * n + i] / (double)periods;
+    *out_mean = mean;
+    return true;
+}
+
+static bool make_block(struct recording *r, size_t n)
+{
+    r->block.samples = n;
+    return average(r->all.torque_ref, r->lead, n, r->periods, &r->block.torque_ref) &&
+           average(r->all.torque, r->lead, n, r->periods, &r->block.torque) &&
+           average(r->all.position, r->lead, n, r->periods, &r->block.position) &&
+           average(r->all.velocity, r->lead, n, r->periods, &r->block.velocity);
+}
+
+static size_t smooth_length(size_t most)
+{
+    for (size_t n = most;; n--) {
+        size_t rest = n;
+        static const size_t primes[] = {2, 3, 5};
+        for (size_t i = 0; i < 3; i++)
+            while (rest % primes[i] == 0)
+                rest /= primes[i];
+        if (rest == 1)
+            return n;
+    }
+}
+
+/// Power of the torque per bin of the block, tapered where the block is not a period.
+static bool torque_power(const struct recording *r, double *out_power)
+{
+    size_t n = r->block.samples;
+    double *time = malloc(4 * n * sizeof *time);
+    struct fft_plan *plan = fft_plan_create(n);
+    if (time && plan) {
+        for (size_t i = 0; i < n; i++) {
+            double s = sin(3.14159265358979324 * ((double)i + 0.5) / (double)n);
+            time[2 * i] = r->block.torque[i] * (r->periodic ? 1.0 : s * s);
+            time[2 * i + 1] = 0.0;
+        }
+        fft_forward(plan, time, time + 2 * n);
+        for (size_t k = 0; k < n / 2; k++)
+            out_power[k] = time[2 * n + 2 * k] * time[2 * n + 2 * k] + time[2 * n + 2 * k + 1] * time[2 * n + 2 * k + 1];
+    }
+    bool good = time && plan;
+    free(time);
+    if (plan)
+        fft_plan_destroy(plan);
+    return good;
+}
+
+/// Excited bins: the file's, else those with torque: for a period the bins above a thousandth of the median of the strongest
+/// tenth, for other runs every bin up to the one below which 99.9 % of the torque's power lies.
+static bool choose_bins(const struct run *run, struct recording *r)
+{
+    size_t half = r->block.samples / 2;
+    r->bins = malloc(half * sizeof *r->bins);
+    double *power = malloc(half * sizeof *power);
+    bool good = r->bins && power && torque_power(r, power);
+    if (good && r->periodic && run->bin_count > 0) {
+        for (size_t i = 0; i < run->bin_count && run->bins[i] < half; i++)
+            r->bins[r->bin_count++] = run->bins[i];
+    } else if (good) {
+        double total = 0.0, sum = 0.0, strongest = 0.0;
+        for (size_t k = 1; k < half; k++) {
+            total += power[k];
+            strongest = fmax(strongest, power[k]);
+        }
+        for (size_t k = 1; k < half && sum < 0.999 * total; k++) {
+            sum += power[k];
+            if (!r->periodic || power[k] > 1e-4 * strongest)
+                r->bins[r->bin_count++] = k;
+        }
+    }
+    free(power);
+    return good && r->bin_count > 0;
+}
+
+/// Half as far again as the excitation goes: friction puts harmonics there, and nothing drives the model there.
+static void choose_band(struct recording *r)
+{
+    size_t highest = r->bins[r->bin_count - 1];
+    double most = 0.4 * (double)r->block.samples;
+    r->band = (size_t)fmin(1.5 * (double)highest, most);
+}
+
+static void measure_coverage(struct recording *r)
+{
+    const struct stretch *b = &r->block;
+    double low = b->position[0], high = low, torque = 0.0, velocity = 0.0, peak = 0.0, mean = 0.0;
+    for (size_t i = 0; i < b->samples; i++) {
+        low = fmin(low, b->position[i]);
+        high = fmax(high, b->position[i]);
+        mean += b->torque[i] / (double)b->samples;
+        torque += b->torque[i] * b->torque[i];
+        velocity += b->velocity[i] * b->velocity[i];
+        peak = fmax(peak, fabs(b->velocity[i]));
+    }
+    double n = (double)b->samples;
+    r->coverage = (struct sim_coverage){
+        .position_span = high - low,
+        .velocity_rms = sqrt(velocity / n),
+        .velocity_peak = peak,
+        .torque_rms = sqrt(fmax(torque / n - mean * mean, 0.0)),
+        .duration_s = n * (double)r->periods / r->rate_hz,
+        .frequency_max_hz = (double)r->bins[r->bin_count - 1] * r->rate_hz / n,
+        .linear = r->linear,
+    };
+}
+
+int recording_prepare(const struct run *run, struct recording *out_recording, struct error *out_error)
+{
+    struct recording *r = out_recording;
+    memset(r, 0, sizeof *r);
+    r->linear = run->linear;
+    r->rate_hz = run->sample_rate_hz;
+    r->periods = 1;
+    const size_t fewest = 64;
+    if (run->rows < fewest)
+        return error_set(out_error, error_refused, "%s: %zu rows; diagnosis needs at least %zu", run->path, run->rows, fewest);
+    choose_periods(run, r);
+    int status = take_columns(run, r, out_error);
+    if (status == 0 && !make_block(r, r->periodic ? run->period_samples : smooth_length(run->rows)))
+        status = error_set(out_error, error_refused, "%s: not enough memory", run->path);
+    if (status == 0 && !choose_bins(run, r))
+        status = error_set(out_error, error_refused, "%s: the torque is constant: nothing was excited", run->path);
+    if (status == 0) {
+        choose_band(r);
+        measure_coverage(r);
+        if (!(r->coverage.velocity_rms > 0.0 && r->coverage.position_span > 0.0))
+            status = error_set(out_error, error_refused, "%s: the axis does not move", run->path);
+    }
+    if (status != 0)
+        recording_free(r);
+    return status;
+}

@@ -1,0 +1,266 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/diagnose/search.h"
+
+#include "lab/numeric/least_squares.h"
+
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { scan_iterations = 2, refine_iterations = 8, refined_candidates = 3 };
+
+double search_threshold(const struct fit_data *data, int effect)
+{
+    const double floor_nats = 12.0;
+    double parameters = (double)sim_effects[effect]->parameter_count;
+    return floor_nats + 0.5 * parameters * log((double)data->values);
+}
+
+struct candidate {
+    int effect;
+    double cost;
+    struct hypothesis hypothesis;
+};
+
+/// The torque that an effect at `values` would have added over the recorded motion, whitened: what the residual would look
+/// like, to first order, without running the simulation. `columns` of them: sine and cosine of an effect with a phase.
+static size_t quick_columns(const struct fit_data *data, int effect, const double *values, double *signal, double *out)
+{
+    const struct sim_effect *e = sim_effects[effect];
+    double p[sim_effect_parameters_max];
+    memcpy(p, values, sizeof p);
+    size_t columns = e->parameter_count > 1 && e->parameters[1].kind == sim_parameter_phase ? 2 : 1;
+    for (size_t column = 0; column < columns; column++) {
+        double *whitened = out + column * data->values;
+        p[1] = columns == 2 ? 1.5707963267948966 * (double)column : values[1];
+        for (size_t i = 0; i < data->runs; i++) {
+            const struct recording *r = data->evidence[i].recording;
+            for (size_t n = 0; n < r->block.samples; n++) {
+                size_t next = n + 1 < r->block.samples ? n + 1 : n;
+                struct sim_motion at = {.position = 0.5 * (r->block.position[n] + r->block.position[next]),
+                                        .velocity = 0.5 * (r->block.velocity[n] + r->block.velocity[next]),
+                                        .time_s = (double)n / r->rate_hz,
+                                        .linear = r->linear};
+                struct sim_opposing o = {.positive_factor = 1.0, .negative_factor = 1.0};
+                e->oppose(p, &at, &o);
+                signal[n] = o.smooth + (at.velocity > 0.0 ? o.dry : -o.dry);
+            }
+            evidence_whiten(&data->evidence[i], signal, NULL, whitened);
+            whitened += data->evidence[i].values;
+        }
+    }
+    return columns;
+}
+
+/// Cost that would be left if the effect at `io_values` were added, by linear least squares beside the present coordinates.
+/// Its size (and phase) in io_values becomes the best one.
+static double quick_cost(const struct fit_data *data, const struct hypothesis *h, const struct fit *fit, int effect,
+                         double *io_values, double *work)
+{
+    size_t rows = data->values, m = h->count;
+    double *A = work, *b = A + rows * (m + 2), *signal = b + rows;
+    double weight[hypothesis_coordinates_max + 2] = {0}, centre[hypothesis_coordinates_max + 2] = {0};
+    double x[hypothesis_coordinates_max + 2];
+    for (size_t i = 0; i < m; i++) {
+        weight[i] = h->coordinates[i].weight;
+        centre[i] = h->coordinates[i].centre - h->x[i];
+    }
+    size_t columns = quick_columns(data, effect, io_values, signal, A + rows * m);
+    m += columns;
+    for (size_t j = 0; j < rows; j++)
+        b[j] = -fit->residual[j];
+    if (!least_squares_solve(rows, m, A, b, weight, centre, x, NULL))
+        return INFINITY;
+    double cost = 0.0;
+    for (size_t i = 0; i < m; i++)
+        for (size_t j = 0; j < rows; j++)
+            b[j] -= A[rows * i + j] * x[i];
+    for (size_t j = 0; j < rows; j++)
+        cost += b[j] * b[j];
+    // The columns are torques on the motor; the residual is in torques on the whole inertia of the given model.
+    const struct sim_model *e = &h->engaged;
+    double moved = e->motor_inertia_kgm2 + (e->structure == sim_structure_rigid ? e->load_inertia_kgm2 : 0.0);
+    double scale = moved / data->evidence[0].scale_inertia;
+    if (columns == 2) {
+        io_values[1] = atan2(x[m - 1], x[m - 2]);
+        io_values[0] *= hypot(x[m - 1], x[m - 2]) * scale;
+    } else if (x[m - 1] > 0.0) {
+        io_values[0] *= x[m - 1] * scale;
+    }
+    return cost;
+}
+
+enum { scan_kept = 5 };
+
+/// Scan values worth a real step: all of a short scan, the best few by quick cost of a long one.
+static size_t choose_scan(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *from,
+                          const struct fit *fit, int effect, double out_values[][sim_effect_parameters_max])
+{
+    struct sim_model current;
+    hypothesis_model(from, NULL, &current);
+    const struct sim_effect *e = sim_effects[effect];
+    double values[sim_effect_parameters_max] = {0}, costs[sim_effect_scan_max];
+    size_t count = 0, longest = 0;
+    for (size_t i = 0; i < data->runs; i++)
+        longest = data->evidence[i].recording->block.samples > longest ? data->evidence[i].recording->block.samples : longest;
+    double *work = NULL;
+    bool quick = e->oppose && e->scan(&current, coverage, sim_effect_scan_max, values);
+    if (quick) {
+        work = malloc((data->values * (from->count + 3) + longest) * sizeof *work);
+        if (!work)
+            return 0;
+        memcpy(work, fit->jacobian, data->values * from->count * sizeof *work);
+    }
+    size_t most = quick ? scan_kept : sim_effect_scan_max;
+    for (size_t i = 0; e->scan(&current, coverage, i, values); i++) {
+        double cost = quick ? quick_cost(data, from, fit, effect, values, work) : (double)i;
+        size_t place = count < most ? count++ : most;
+        while (place > 0 && costs[place - 1] > cost) {
+            place--;
+            if (place + 1 < most) {
+                costs[place + 1] = costs[place];
+                memcpy(out_values[place + 1], out_values[place], sizeof values);
+            }
+        }
+        if (place < most) {
+            costs[place] = cost;
+            memcpy(out_values[place], values, sizeof values);
+        }
+    }
+    free(work);
+    return count;
+}
+
+/// Tries one effect from its scan values with one step each, or a short fit where the structure changes and derivatives of the
+/// old one are worth nothing; keeps the best.
+static bool scan_effect(struct fit *scratch, const struct fit_data *data, const struct sim_coverage *coverage,
+                        const struct hypothesis *from, const struct fit *fit, int effect, struct candidate *out)
+{
+    double values[sim_effect_scan_max][sim_effect_parameters_max];
+    size_t count = choose_scan(data, coverage, from, fit, effect, values);
+    out->effect = effect;
+    out->cost = INFINITY;
+    for (size_t i = 0; i < count; i++) {
+        struct hypothesis trial = *from;
+        hypothesis_name(&trial, effect, values[i]);
+        bool restructured = trial.engaged.structure != from->engaged.structure;
+        if (!(restructured ? fit_run(scratch, data, &trial, scan_iterations) : fit_step(scratch, data, from, fit, &trial)))
+            continue;
+        if (scratch->cost < out->cost) {
+            out->cost = scratch->cost;
+            out->hypothesis = trial;
+        }
+    }
+    return isfinite(out->cost);
+}
+
+static int by_cost(const void *a, const void *b)
+{
+    double x = ((const struct candidate *)a)->cost, y = ((const struct candidate *)b)->cost;
+    return (x > y) - (x < y);
+}
+
+/// Scaled gain in nats of a candidate over the current fit.
+static double scaled_gain(const struct fit_data *data, double cost_before, double cost_after)
+{
+    double misfit = fmax(cost_after / (double)data->values, 1.0);
+    return 0.5 * (cost_before - cost_after) / misfit;
+}
+
+static bool can_show(const struct hypothesis *h, const struct sim_coverage *coverage, int effect)
+{
+    char why[160];
+    double values[sim_effect_parameters_max], unused[sim_effect_parameters_max];
+    hypothesis_parameters(h, effect, NULL, values, unused);
+    return !sim_effects[effect]->testable || sim_effects[effect]->testable(values, coverage, why, sizeof why);
+}
+
+/// One round of forward selection. Returns whether an effect was added.
+static bool add_best(const struct fit_data *data, const struct sim_coverage *coverage, struct hypothesis *io_h, struct fit *fit)
+{
+    struct candidate *list = calloc(sim_effects_max, sizeof *list);
+    struct fit scratch = {0};
+    double best = 0.0;
+    if (list && fit_init(&scratch, data)) {
+        size_t count = 0;
+        for (int e = 0; sim_effects[e]; e++)
+            if (hypothesis_may_name(io_h, e) && scan_effect(&scratch, data, coverage, io_h, fit, e, &list[count]))
+                count++;
+        qsort(list, count, sizeof *list, by_cost);
+        size_t chosen = count;
+        for (size_t i = 0; i < count && i < refined_candidates; i++) {
+            fit_run(&scratch, data, &list[i].hypothesis, refine_iterations);
+            double gain = scaled_gain(data, fit->cost, scratch.cost) - search_threshold(data, list[i].effect);
+            if (gain > best && can_show(&list[i].hypothesis, coverage, list[i].effect)) {
+                best = gain;
+                chosen = i;
+            }
+        }
+        if (chosen < count) {
+            *io_h = list[chosen].hypothesis;
+            fit_run(fit, data, io_h, refine_iterations);
+        }
+    }
+    fit_free(&scratch);
+    free(list);
+    return best > 0.0;
+}
+
+double search_evidence(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit, int effect)
+{
+    struct hypothesis without = *hypothesis;
+    struct fit trial;
+    if (!fit_init(&trial, data))
+        return -INFINITY;
+    hypothesis_unname(&without, effect);
+    fit_run(&trial, data, &without, refine_iterations);
+    double gain = 0.5 * (trial.cost - fit->cost);
+    fit_free(&trial);
+    return gain;
+}
+
+/// Drops the named effect that is needed least, if it is not needed. Returns whether one was dropped.
+static bool drop_weakest(const struct fit_data *data, struct hypothesis *io_h, struct fit *fit)
+{
+    int weakest = -1;
+    double least = 0.0, misfit = fmax(fit->cost / (double)data->values, 1.0);
+    for (int e = 0; sim_effects[e]; e++) {
+        if (!io_h->named[e])
+            continue;
+        double margin = search_evidence(data, io_h, fit, e) / misfit - search_threshold(data, e);
+        if (margin < least) {
+            least = margin;
+            weakest = e;
+        }
+    }
+    if (weakest < 0)
+        return false;
+    hypothesis_unname(io_h, weakest);
+    fit_run(fit, data, io_h, refine_iterations);
+    return true;
+}
+
+static size_t named_count(const struct hypothesis *h)
+{
+    size_t count = 0;
+    for (int e = 0; sim_effects[e]; e++)
+        count += h->named[e];
+    return count;
+}
+
+bool search_run(const struct fit_data *data, const struct sim_coverage *coverage, const struct search_options *options,
+                struct hypothesis *io_hypothesis, struct fit *io_fit)
+{
+    if (!fit_run(io_fit, data, io_hypothesis, refine_iterations))
+        return false;
+    for (size_t round = 0; round < 2 * options->causes_max && named_count(io_hypothesis) < options->causes_max; round++) {
+        if (options->progress && !options->progress(options->user, "searching"))
+            break;
+        if (!add_best(data, coverage, io_hypothesis, io_fit))
+            break;
+        while (named_count(io_hypothesis) > 1 && drop_weakest(data, io_hypothesis, io_fit)) {
+        }
+    }
+    return true;
+}

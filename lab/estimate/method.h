@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: MIT */
+/// The methods that make a frequency response from a periodic recording, and what all of them share.
+/// One file per method; this table is the only place that knows them all.
+#ifndef SERVOSCOPE_ESTIMATE_METHOD_H
+#define SERVOSCOPE_ESTIMATE_METHOD_H
+
+#include "lab/estimate/periodic.h"
+#include "lab/record/frf_file.h"
+
+#include <complex.h>
+
+struct estimate_method {
+    const char *name;    ///< as given to --method
+    const char *summary; ///< one line
+    /// Errors: error_refused with the reason; *out_frf is empty then.
+    int (*estimate)(const struct periodic *recording, struct frf *out_frf, struct error *out_error);
+};
+
+/// All methods; the last one has no name.
+extern const struct estimate_method estimate_methods[];
+
+/// Finds a method by name.
+/// Errors: NULL for one that is not there; *out_error (error_usage) lists those that are.
+const struct estimate_method *estimate_method_find(const char *name, struct error *out_error);
+
+/// A line counts as excited if scatter alone explains its mean input with less than this chance.
+extern const double estimate_chance_of_dead_line;
+
+/// For methods: allocates a response with frequencies, names, units, periods and real degrees of freedom.
+int estimate_begin(const struct periodic *recording, const char *method, double degrees_of_freedom, struct frf *out_frf,
+                   struct error *out_error);
+
+/// For methods: puts in one valid line. The one recording tells no distortion from the response, so that the total
+/// standard deviation is that of the noise.
+void estimate_set_line(struct frf *io_frf, size_t line, double complex response, double std);
+
+/// For methods: refuses a response without a single valid line (and frees it), else adds the keys that say how it was
+/// made: settle_periods, settle_from, lost_periods, confidence_95_factor and others.
+int estimate_end(const struct periodic *recording, struct frf *io_frf, struct error *out_error);
+
+/// Sets a key of a response, replacing an equal one. Errors: false if memory is short.
+bool estimate_set_key(struct frf *io_frf, const char *key, const char *format, ...)
+#if defined(__GNUC__)
+    __attribute__((format(printf, 3, 4)))
+#endif
+    ;
+
+/// Averages the responses of several realisations (runs with other phases or levels, same lines) with equal weights.
+///
+/// Equation:  G = mean G_r;  noise_std = sqrt(sum noise_std_r^2) / R
+///            std = sqrt(sum |G_r - G|^2 / (R )): noise and stochastic nonlinear distortion together
+/// Validity:  a line is valid if it is in every realisation; degrees of freedom 2
+/// Errors:    error_refused if the lines or the names of input and output differ; *out_frf is empty then
+int estimate_average(const struct frf *realisations, size_t count, struct frf *out_frf, struct error *out_error);
+
+#endif

@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT */
+/// Spectra of a periodic recording, period by period.
+#ifndef SERVOSCOPE_ESTIMATE_SPECTRA_H
+#define SERVOSCOPE_ESTIMATE_SPECTRA_H
+
+#include <complex.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/// Transforms `periods` consecutive periods at chosen bins.
+/// Equation:  Y_{p,b} = sum_{n=0}^{N-1} y[p N + n] exp(-j 2 pi k_b n / N)
+/// Shapes:    signal: periods x period_samples; bins: bin_count; out_spectra: periods x bin_count, period-major
+/// Units:     those of the signal times samples: a sine of amplitude A on bin k gives |Y| = A N / 2
+/// Range:     bins below period_samples (0 is the sum of the samples); period_samples >= 1
+/// Errors:    false if memory is short
+/// Cost:      a direct sum against one table of twiddles, or an FFT, whichever needs less (spectra_prefers_fft)
+/// Test:      tests/unit/test_spectra.c
+bool spectra_transform_periods(const double *signal, size_t period_samples, size_t periods, const uint32_t *bins,
+                               size_t bin_count, double complex *out_spectra);
+
+/// Transforms the same at every bin from 0 to period_samples/2; out_spectra: periods x (period_samples/2 + 1).
+bool spectra_transform_all(const double *signal, size_t period_samples, size_t periods, double complex *out_spectra);
+
+/// Tells whether an FFT of this length beats a direct sum over bin_count bins. KissFFT costs about N times the sum of
+/// the length's prime factors, so that a prime length is cheaper by the sum unless most bins are wanted.
+bool spectra_prefers_fft(size_t period_samples, size_t bin_count);
+
+#endif

@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# scripts/with-vcan: the interfaces are up inside, and status, output and environment come through.
+# Skipped where it would have to install something first.
+set -euo pipefail
+with_vcan=$SERVOSCOPE_SOURCE/scripts/with-vcan
+[ -e /sys/class/net/vcan0 ] || command -v linux.uml >/dev/null || exit 77
+
+result=0
+GREETING='with "quotes"' "$with_vcan" -i "vcan0 vcan1" bash -c '
+    for name in vcan0 vcan1; do (( $(</sys/class/net/$name/flags) & 1 )) || exit 4; done
+    echo "$GREETING $PWD"; echo error >&2; exit 3' >out 2>err || result=$?
+[ "$result" -eq 3 ]
+[ "$(cat out)" = "with \"quotes\" $PWD" ]
+[ "$(cat err)" = error ]

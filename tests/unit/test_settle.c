@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/estimate/settle.h"
+#include "lab/numeric/statistics.h"
+
+#include "unity.h"
+
+#include <math.h>
+
+void setUp(void) {}
+
+void tearDown(void) {}
+
+/// Periods of a constant spectrum with scatter 1, and a transient of size `start` that falls by `decay` per period.
+static void make_periods(double complex *spectra, size_t periods, size_t bins, double start, double decay,
+                         uint64_t seed)
+{
+    struct random random;
+    random_seed(&random, seed);
+    for (size_t p = 0; p < periods; p++) {
+        for (size_t b = 0; b < bins; b++) {
+            double real = random_normal(&random);
+            double imaginary = random_normal(&random);
+            spectra[p * bins + b] = 100.0 + start * pow(decay, (double)p) + (real + imaginary * I) * sqrt(0.5);
+        }
+    }
+}
+
+static void test_settle_counts_periods_of_a_decaying_transient(void)
+{
+    enum { periods = 12, bins = 50 };
+    static double complex spectra[periods * bins];
+    bool usable[periods];
+    double level[periods];
+    for (size_t p = 0; p < periods; p++) {
+        usable[p] = true;
+    }
+    for (uint64_t seed = 1; seed <= 50; seed++) {
+        struct settle settle;
+        /* 100, 10, 1, 0.1 times the scatter: the first two for certain, the fourth never. */
+        make_periods(spectra, periods, bins, 100.0, 0.1, seed);
+        TEST_ASSERT_TRUE(settle_measure(spectra, periods, bins, usable, &settle, level));
+        TEST_ASSERT_TRUE_MESSAGE(settle.periods == 2 || settle.periods == 3, "periods left out");
+        TEST_ASSERT_TRUE(settle.settled);
+        TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.1, settle.decay_per_period);
+        TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.0, level[0]);
+    }
+}
+
+static void test_settle_leaves_nothing_out_without_a_transient(void)
+{
+    enum { periods = 10, bins = 50, runs = 1000 };
+    static double complex spectra[periods * bins];
+    bool usable[periods];
+    double level[periods];
+    size_t left_out = 0;
+    for (size_t p = 0; p < periods; p++) {
+        usable[p] = true;
+    }
+    for (uint64_t seed = 1; seed <= runs; seed++) {
+        struct settle settle;
+        make_periods(spectra, periods, bins, 0.0, 1.0, seed);
+        TEST_ASSERT_TRUE(settle_measure(spectra, periods, bins, usable, &settle, level));
+        left_out += settle.periods > 0;
+    }
+    /* One in a thousand by design; more than six of a thousand would come by chance once in 10^4. */
+    TEST_ASSERT_TRUE(left_out <= 6);
+}
+
+static void test_settle_says_when_it_cannot_tell(void)
+{
+    enum { periods = 3, bins = 4 };
+    double complex spectra[periods * bins];
+    bool usable[periods] = {true, true, true};
+    double level[periods];
+    struct settle settle;
+    make_periods(spectra, periods, bins, 100.0, 0.1, 1);
+    TEST_ASSERT_TRUE(settle_measure(spectra, periods, bins, usable, &settle, level));
+    TEST_ASSERT_FALSE(settle.settled);
+    TEST_ASSERT_EQUAL_size_t(0, settle.periods);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_settle_counts_periods_of_a_decaying_transient);
+    RUN_TEST(test_settle_leaves_nothing_out_without_a_transient);
+    RUN_TEST(test_settle_says_when_it_cannot_tell);
+    return UNITY_END();
+}
