@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /// A CAN bus inside the program: virtual time, bit timing, arbitration by identifier, and faults injected on purpose.
 /// Nothing here is random or reads a clock: the same calls give the same frames at the same nanoseconds.
-/// Time moves only while a port waits (or inproc_bus_run is called). Participants are called from there; they may send, but
-/// must not wait.
+/// Time moves only while a port waits (or inproc_bus_run is called). Participants are called from there; they may send,
+/// but must not wait.
 #ifndef SERVOSCOPE_PORTS_INPROC_H
 #define SERVOSCOPE_PORTS_INPROC_H
 
@@ -41,8 +41,8 @@ enum { inproc_any = 0xFFFF };
 
 struct inproc_fault {
     enum inproc_fault_kind kind;
-    uint16_t cob_id;    ///< which frames are counted, or inproc_any
-    uint32_t nth;       ///< the n-th of them is hit, 1 is the first
+    uint16_t cob_id; ///< which frames are counted, or inproc_any
+    uint32_t nth;    ///< the n-th of them is hit, 1 is the first
     uint32_t delay_us;
     uint8_t byte, mask; ///< a byte beyond the frame's length hits nothing and is not counted
     uint8_t endpoint;
@@ -64,9 +64,9 @@ struct inproc_bus;
 
 struct inproc_endpoint {
     struct inproc_bus *bus;
-    struct can_participant participant;    ///< receive is NULL for a port
+    struct can_participant participant; ///< receive is NULL for a port
     bool off;
-    uint64_t back_ns;                      ///< when it comes back
+    uint64_t back_ns; ///< when it comes back
     size_t send_count;
     struct can_frame send[inproc_send_max]; ///< oldest first
     size_t receive_first, receive_count;
@@ -85,8 +85,8 @@ struct inproc_bus {
     uint32_t bitrate;
     enum inproc_stuffing stuffing;
     uint64_t now_ns;
-    uint64_t idle_ns;                       ///< when the bus is free again
-    bool sending;                           ///< `wire` is under way and ends at end_ns
+    uint64_t idle_ns; ///< when the bus is free again
+    bool sending;     ///< `wire` is under way and ends at end_ns
     uint8_t from;
     uint64_t end_ns;
     struct can_frame wire;
@@ -96,7 +96,7 @@ struct inproc_bus {
     size_t fault_count;
     size_t late_count;
     struct inproc_late late[inproc_late_max];
-    uint32_t seen[can_id_max + 1];          ///< frames by identifier
+    uint32_t seen[can_id_max + 1]; ///< frames by identifier
     struct inproc_counters counters;
 };
 

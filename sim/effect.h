@@ -89,8 +89,10 @@ struct sim_effect {
     bool (*scan)(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out_parameters);
     /// Whether a recording can show the effect with these parameters; if not, says why in one clause.
     bool (*testable)(const double *parameters, const struct sim_coverage *coverage, char *out_why, size_t size);
-    /// Smallest size worth a name: relative change of a parameter that the given model already has.
-    double minimum_change;
+    /// NULL, or whether part of the effect's usual range cannot show in a recording; if so, says which and why in one clause.
+    bool (*blind)(const struct sim_coverage *coverage, char *out_why, size_t size);
+    /// The measurement that shows this effect apart from others: a clause after "measure".
+    const char *measure;
     /// One sentence for the engineer, every number from the finding.
     void (*say)(const struct sim_finding *finding, char *out_text, size_t size);
 };

@@ -33,10 +33,10 @@ unsigned can_frame_bits_worst(unsigned length)
 
 /// The bits of a frame from its start on, as a receiver sees them without stuff bits.
 struct bit_stream {
-    unsigned run;      ///< equal bits in a row on the wire
-    unsigned last;     ///< the bit they are; 2 before the first one
-    unsigned stuffed;  ///< stuff bits so far
-    uint32_t crc;      ///< of what was put, CAN's 15 bits
+    unsigned run;     ///< equal bits in a row on the wire
+    unsigned last;    ///< the bit they are; 2 before the first one
+    unsigned stuffed; ///< stuff bits so far
+    uint32_t crc;     ///< of what was put, CAN's 15 bits
 };
 
 static void stream_wire(struct bit_stream *self, unsigned bit)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /// What drivers/can asks of a CAN interface, and what a bus that calls back asks of a participant.
-/// A port is a const table of functions and the object they work on. It owns the time: drivers read it here and pass times
-/// on as arguments. Times are microseconds since the port was made; they never run backwards.
+/// A port is a const table of functions and the object they work on. It owns the time: drivers read it here and pass
+/// times on as arguments. Times are microseconds since the port was made; they never run backwards.
 #ifndef SERVOSCOPE_DRIVERS_CAN_PORT_H
 #define SERVOSCOPE_DRIVERS_CAN_PORT_H
 

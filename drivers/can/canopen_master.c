@@ -130,7 +130,8 @@ uint32_t canopen_master_read_surely(struct canopen_master *self, uint16_t index,
     return abort_code == od_abort_none ? od_abort_incompatible : abort_code;
 }
 
-uint32_t canopen_master_write(struct canopen_master *self, uint16_t index, uint8_t subindex, uint8_t size, uint32_t value)
+uint32_t canopen_master_write(struct canopen_master *self, uint16_t index, uint8_t subindex, uint8_t size,
+                              uint32_t value)
 {
     uint32_t abort_code = od_abort_timeout;
     for (int attempt = 0; attempt < canopen_master_sdo_attempts && worth_another(abort_code); attempt++) {

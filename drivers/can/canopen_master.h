@@ -21,17 +21,17 @@ enum { canopen_master_sdo_attempts = 3 };
 
 struct canopen_master {
     struct can_port port;
-    uint8_t node_id;                 ///< of the drive
-    uint8_t master_id;               ///< in our own heartbeat
-    uint32_t sdo_timeout_us;         ///< for one answer
+    uint8_t node_id;         ///< of the drive
+    uint8_t master_id;       ///< in our own heartbeat
+    uint32_t sdo_timeout_us; ///< for one answer
     struct sdo_client sdo;
     struct heartbeat_producer producer;
     struct heartbeat_consumer consumer;
     struct sync_producer sync;
-    struct emcy_message emergency;   ///< last one that reported an error
-    uint32_t emergencies;            ///< those with a code other than 0
-    uint32_t unexpected;             ///< frames of our node that are nothing we know
-    enum can_status status;          ///< sticky: bus off or gone
+    struct emcy_message emergency; ///< last one that reported an error
+    uint32_t emergencies;          ///< those with a code other than 0
+    uint32_t unexpected;           ///< frames of our node that are nothing we know
+    enum can_status status;        ///< sticky: bus off or gone
     /// Process data of the node: frames 180..57F with its number.
     void (*on_process_data)(void *owner, const struct can_frame *frame);
     void *owner;
@@ -45,7 +45,8 @@ uint64_t canopen_master_time_us(const struct canopen_master *self);
 /// Sends; remembers a lost bus in `status`. can_err_full is not sticky.
 enum can_status canopen_master_send(struct canopen_master *self, const struct can_frame *frame);
 
-/// Serves what has arrived and what is due; waits for a frame until `until_us` at most. Call in a loop with the condition.
+/// Serves what has arrived and what is due; waits for a frame until `until_us` at most. Call in a loop with the
+/// condition.
 enum can_status canopen_master_step(struct canopen_master *self, uint64_t until_us);
 
 /// Serves the bus until `until_us`, whatever comes.
@@ -61,7 +62,8 @@ uint32_t canopen_master_read_surely(struct canopen_master *self, uint16_t index,
                                     uint32_t *out_value);
 
 /// Writes an object.
-uint32_t canopen_master_write(struct canopen_master *self, uint16_t index, uint8_t subindex, uint8_t size, uint32_t value);
+uint32_t canopen_master_write(struct canopen_master *self, uint16_t index, uint8_t subindex, uint8_t size,
+                              uint32_t value);
 
 /// Writes and reads back; od_abort_incompatible if what is read, under `mask`, is not what was written.
 uint32_t canopen_master_write_surely(struct canopen_master *self, uint16_t index, uint8_t subindex, uint8_t size,

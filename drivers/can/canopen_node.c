@@ -73,32 +73,37 @@ static uint32_t write_pdo(void *owner, const struct od_entry *entry, int64_t val
 }
 
 #define AT(member) offsetof(struct canopen_node, member)
-#define CONSTANT(index, sub, type, value) {index, sub, type, od_readable | od_constant, 0, value, NULL}
-#define READ_ONLY(index, sub, type, member) {index, sub, type, od_readable, AT(member), 0, NULL}
-#define WRITABLE(index, sub, type, member, write) {index, sub, type, od_readable | od_writable, AT(member), 0, write}
-#define MAPPABLE(index, sub, member, direction) {index, sub, od_u8, od_readable | direction, AT(member), 0, NULL}
+#define CONSTANT(index, sub, type, value)                                                                              \
+    {                                                                                                                  \
+        index, sub, type, od_readable | od_constant, 0, value, NULL                                                    \
+    }
+#define READ_ONLY(index, sub, type, member)                                                                            \
+    {                                                                                                                  \
+        index, sub, type, od_readable, AT(member), 0, NULL                                                             \
+    }
+#define WRITABLE(index, sub, type, member, write)                                                                      \
+    {                                                                                                                  \
+        index, sub, type, od_readable | od_writable, AT(member), 0, write                                              \
+    }
+#define MAPPABLE(index, sub, member, direction)                                                                        \
+    {                                                                                                                  \
+        index, sub, od_u8, od_readable | direction, AT(member), 0, NULL                                                \
+    }
 
-#define PDO_PARAMETERS(base, pdo)                           \
-    CONSTANT(base, 0, od_u8, 2),                            \
-    WRITABLE(base, 1, od_u32, pdo.cob_id, write_pdo),       \
-    WRITABLE(base, 2, od_u8, pdo.transmission_type, write_pdo)
+#define PDO_PARAMETERS(base, pdo)                                                                                      \
+    CONSTANT(base, 0, od_u8, 2), WRITABLE(base, 1, od_u32, pdo.cob_id, write_pdo),                                     \
+        WRITABLE(base, 2, od_u8, pdo.transmission_type, write_pdo)
 
-#define PDO_MAPPING(base, pdo)                              \
-    WRITABLE(base, 0, od_u8, pdo.mapped_count, write_pdo),  \
-    WRITABLE(base, 1, od_u32, pdo.mapped[0], write_pdo),    \
-    WRITABLE(base, 2, od_u32, pdo.mapped[1], write_pdo),    \
-    WRITABLE(base, 3, od_u32, pdo.mapped[2], write_pdo),    \
-    WRITABLE(base, 4, od_u32, pdo.mapped[3], write_pdo),    \
-    WRITABLE(base, 5, od_u32, pdo.mapped[4], write_pdo),    \
-    WRITABLE(base, 6, od_u32, pdo.mapped[5], write_pdo),    \
-    WRITABLE(base, 7, od_u32, pdo.mapped[6], write_pdo),    \
-    WRITABLE(base, 8, od_u32, pdo.mapped[7], write_pdo)
+#define PDO_MAPPING(base, pdo)                                                                                         \
+    WRITABLE(base, 0, od_u8, pdo.mapped_count, write_pdo), WRITABLE(base, 1, od_u32, pdo.mapped[0], write_pdo),        \
+        WRITABLE(base, 2, od_u32, pdo.mapped[1], write_pdo), WRITABLE(base, 3, od_u32, pdo.mapped[2], write_pdo),      \
+        WRITABLE(base, 4, od_u32, pdo.mapped[3], write_pdo), WRITABLE(base, 5, od_u32, pdo.mapped[4], write_pdo),      \
+        WRITABLE(base, 6, od_u32, pdo.mapped[5], write_pdo), WRITABLE(base, 7, od_u32, pdo.mapped[6], write_pdo),      \
+        WRITABLE(base, 8, od_u32, pdo.mapped[7], write_pdo)
 
-#define PDO(number)                                                        \
-    PDO_PARAMETERS(index_rpdo + number, rpdo[number]),                     \
-    PDO_MAPPING(index_rpdo_mapping + number, rpdo[number]),                \
-    PDO_PARAMETERS(index_tpdo + number, tpdo[number]),                     \
-    PDO_MAPPING(index_tpdo_mapping + number, tpdo[number])
+#define PDO(number)                                                                                                    \
+    PDO_PARAMETERS(index_rpdo + number, rpdo[number]), PDO_MAPPING(index_rpdo_mapping + number, rpdo[number]),         \
+        PDO_PARAMETERS(index_tpdo + number, tpdo[number]), PDO_MAPPING(index_tpdo_mapping + number, tpdo[number])
 
 static const struct od_entry communication_entries[] = {
     READ_ONLY(0x1000, 0, od_u32, identity.device_type),
@@ -225,10 +230,15 @@ static bool targets_pass(const struct canopen_node *self, const struct pdo *last
     if (!ends_with(last, pdo_check_target_index, 2))
         return true;
     uint8_t check = pdo_check_start;
-    for (const struct pdo *pdo = self->rpdo; pdo <= last; pdo++)
-        if (pdo_is_enabled(pdo) && pdo_is_synchronous(pdo))
-            check = pdo_check(check, pdo->data, pdo == last ? pdo->length - 1u : pdo->length);
-    return check == last->data[last->length - 1] && (last->length < 2 || last->data[last->length - 2] == counter);
+    bool mixed = false;
+    for (const struct pdo *pdo = self->rpdo; pdo <= last; pdo++) {
+        if (!pdo_is_enabled(pdo) || !pdo_is_synchronous(pdo))
+            continue;
+        check = pdo_check(check, pdo->data, pdo == last ? pdo->length - 1u : pdo->length);
+        mixed = mixed || pdo->mixed;
+    }
+    return !mixed && check == last->data[last->length - 1] &&
+           (last->length < 2 || last->data[last->length - 2] == counter);
 }
 
 /// Puts the set-points received before this SYNC in force, all or none.
@@ -252,7 +262,7 @@ static bool take_targets(struct canopen_node *self, uint8_t counter)
             continue;
         if (fresh)
             self->errors.values_refused += pdo_apply(pdo);
-        pdo->pending = false;
+        pdo->pending = pdo->mixed = false;
     }
     return fresh;
 }

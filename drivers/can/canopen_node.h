@@ -19,10 +19,11 @@
 
 /// What the application does; every function must be there.
 struct canopen_node_events {
-    /// One SYNC: mapped objects hold the set-points. targets_fresh is false if a synchronous RPDO was missing, was meant for
-    /// another SYNC or failed its check: then the objects still hold what they held before.
+    /// One SYNC: mapped objects hold the set-points. targets_fresh is false if a synchronous RPDO was missing, was
+    /// meant for another SYNC or failed its check: then the objects still hold what they held before.
     void (*synchronise)(void *owner, uint64_t now_us, bool targets_fresh);
-    /// SYNC (1.5 periods) or the master's heartbeat is missing, or NMT left operational; the code to report if it matters.
+    /// SYNC (1.5 periods) or the master's heartbeat is missing, or NMT left operational; the code to report if it
+    /// matters.
     void (*connection_lost)(void *owner, uint16_t emcy_code, uint64_t now_us);
     /// NMT reset: back to power-on values.
     void (*reset)(void *owner);
@@ -41,13 +42,13 @@ struct canopen_node_errors {
 };
 
 struct canopen_node {
-    struct can_port port;      ///< only `send` is used
+    struct can_port port; ///< only `send` is used
     uint8_t node_id;
     enum nmt_state state;
     struct object_dictionary dictionary;
     const struct canopen_node_events *events;
     void *owner;
-    uint64_t now_us;           ///< of the call being served
+    uint64_t now_us; ///< of the call being served
     struct sdo_server sdo;
     struct heartbeat_producer producer;
     struct heartbeat_consumer consumer;
@@ -56,8 +57,8 @@ struct canopen_node {
     struct pdo rpdo[pdo_per_direction];
     struct pdo tpdo[pdo_per_direction];
     struct canopen_node_identity identity;
-    uint32_t consumer_entry;   ///< 1016:1, node << 16 | ms
-    uint16_t heartbeat_ms;     ///< 1017
+    uint32_t consumer_entry;              ///< 1016:1, node << 16 | ms
+    uint16_t heartbeat_ms;                ///< 1017
     uint8_t sample_counter, sample_check; ///< 2001:1, :2
     uint8_t target_counter, target_check; ///< 2002:1, :2
     bool bus_was_off;

@@ -19,16 +19,16 @@ enum cia402_state {
 };
 
 enum cia402_event {
-    cia402_initialised,         ///< self-test done
-    cia402_shutdown,            ///< control word xxxx x110
-    cia402_switch_on,           ///< 0111; from operation enabled it is "disable operation"
-    cia402_enable_operation,    ///< 1111
-    cia402_disable_voltage,     ///< xx0x
-    cia402_quick_stop,          ///< x01x
-    cia402_fault_reset,         ///< rising edge of bit 7
+    cia402_initialised,      ///< self-test done
+    cia402_shutdown,         ///< control word xxxx x110
+    cia402_switch_on,        ///< 0111; from operation enabled it is "disable operation"
+    cia402_enable_operation, ///< 1111
+    cia402_disable_voltage,  ///< xx0x
+    cia402_quick_stop,       ///< x01x
+    cia402_fault_reset,      ///< rising edge of bit 7
     cia402_fault_detected,
     cia402_fault_reaction_done,
-    cia402_quick_stop_done,     ///< standstill after a quick stop that ends in switch-on disabled
+    cia402_quick_stop_done, ///< standstill after a quick stop that ends in switch-on disabled
     cia402_event_count,
 };
 
@@ -48,15 +48,15 @@ enum cia402_status {
     cia402_status_voltage = 0x0010,
     cia402_status_warning = 0x0080,
     cia402_status_remote = 0x0200,
-    cia402_status_limited = 0x0800,         ///< an internal limit acts
-    cia402_status_follows = 0x1000,         ///< cyclic modes: the set-point of this SYNC is used
+    cia402_status_limited = 0x0800, ///< an internal limit acts
+    cia402_status_follows = 0x1000, ///< cyclic modes: the set-point of this SYNC is used
     cia402_status_following_error = 0x2000,
 };
 
 enum cia402_mode { cia402_mode_csp = 8, cia402_mode_cst = 10 };
 
 /// Bit of a mode in object 6502.
-#define CIA402_SUPPORTS(mode) (1u << ((mode) - 1))
+#define CIA402_SUPPORTS(mode) (1u << ((mode)-1))
 
 /// Device type of a servo drive (object 1000).
 #define CIA402_SERVO_DRIVE 0x00020192u
@@ -124,8 +124,8 @@ void cia402_machine_event(struct cia402_machine *self, enum cia402_event event);
 /// Whether the motor may carry torque.
 bool cia402_machine_is_powered(const struct cia402_machine *self);
 
-/// A sample period as object 60C2 says it: units x 10^exponent s, the smallest unit count. False if it cannot be said in
-/// whole microseconds and 1..255 units.
+/// A sample period as object 60C2 says it: units x 10^exponent s, the smallest unit count. False if it cannot be said
+/// in whole microseconds and 1..255 units.
 bool cia402_period_encode(double period_s, uint8_t *out_units, int8_t *out_exponent);
 
 /// The period in microseconds, 0 if out of range.

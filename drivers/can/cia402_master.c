@@ -57,6 +57,8 @@ unsigned cia402_master_cycle_bits(enum drive_mode mode, bool checked)
 static bool replies_pass(const struct cia402_master *self)
 {
     const uint8_t *first = self->replies[0].data, *second = self->replies[1].data;
+    if (self->mixed)
+        return false;
     if (!self->checked)
         return true;
     uint8_t check = pdo_check(pdo_check(pdo_check_start, first, 8), second, 7);
@@ -75,8 +77,40 @@ static void decode_replies(struct cia402_master *self)
     };
 }
 
-/// Process data has come. The newest frame of each kind counts, so that a leftover of the last cycle does not keep out this
-/// cycle's; whether the two belong together is for the check to say.
+/// A process data frame that comes when none is awaited: after its cycle has ended, or once more.
+static void count_unawaited(struct cia402_master *self)
+{
+    if (!self->cycling || self->complete)
+        self->bus.unexpected++;
+    else if (!self->late_counted)
+        self->counters.samples_late++;
+    self->late_counted = true;
+}
+
+/// Whether TPDO2 carries another SYNC's counter: of an earlier one, or altered. Counts it.
+static bool is_of_another_sync(struct cia402_master *self, int which, const struct can_frame *frame)
+{
+    if (which != 1 || !self->checked || frame->data[6] == self->bus.sync.counter)
+        return false;
+    // Late if a sample is missing, else just not to be used.
+    uint32_t *counter = self->missing_in_a_row > 0 ? &self->counters.samples_late : &self->bus.unexpected;
+    *counter += !self->late_counted;
+    self->late_counted = true;
+    return true;
+}
+
+/// Keeps one reply. Whether the two belong together is for the check to say, and a cycle in which one of them came
+/// twice with different content is none: a leftover of an earlier cycle is among them.
+static void keep_reply(struct cia402_master *self, int which, const struct can_frame *frame)
+{
+    if (self->have[which]) {
+        self->bus.unexpected++;
+        self->mixed = self->mixed || memcmp(self->replies[which].data, frame->data, sizeof frame->data) != 0;
+    }
+    self->replies[which] = *frame;
+    self->have[which] = true;
+}
+
 static void on_process_data(void *owner, const struct can_frame *frame)
 {
     struct cia402_master *self = owner;
@@ -87,18 +121,12 @@ static void on_process_data(void *owner, const struct can_frame *frame)
         return;
     }
     if (!self->awaiting) {
-        if (self->cycling && !self->complete && !self->late_counted) {
-            self->counters.samples_late++;
-            self->late_counted = true;
-        } else if (!self->cycling || self->complete) {
-            self->bus.unexpected++;
-        }
+        count_unawaited(self);
         return;
     }
-    if (self->have[which])
-        self->bus.unexpected++;
-    self->replies[which] = *frame;
-    self->have[which] = true;
+    if (is_of_another_sync(self, which, frame))
+        return;
+    keep_reply(self, which, frame);
     enum cia402_state state;
     if (!self->have[0] || !self->have[1] || !replies_pass(self))
         return;
@@ -149,9 +177,10 @@ static bool run_cycle(struct cia402_master *self)
         self->next_sync_us = now_us + self->targets_us;
     }
     send_targets(self);
-    if (canopen_master_serve(bus, self->next_sync_us) != can_ok)
+    bool in_time = canopen_master_serve(bus, self->next_sync_us) == can_ok;
+    self->have[0] = self->have[1] = self->mixed = self->complete = self->late_counted = false;
+    if (!in_time)
         return false;
-    self->have[0] = self->have[1] = self->complete = self->late_counted = false;
     self->awaiting = true;
     struct can_frame frame = sync_producer_next(&bus->sync);
     canopen_master_send(bus, &frame);
@@ -213,7 +242,8 @@ static uint16_t next_control_word(const struct cia402_master *self)
     case cia402_operation_enabled:
         return cia402_control_enable_operation;
     case cia402_fault: // the reset is an edge: low in between
-        return self->control_word == cia402_control_fault_reset ? cia402_control_disable_voltage : cia402_control_fault_reset;
+        return self->control_word == cia402_control_fault_reset ? cia402_control_disable_voltage
+                                                                : cia402_control_fault_reset;
     default:
         return cia402_control_disable_voltage;
     }
@@ -248,8 +278,8 @@ static enum drive_status enter_operation(struct cia402_master *self)
     }
     if (self->state == cia402_fault)
         return drive_fault(self, "switching on");
-    snprintf(self->detail, sizeof self->detail, "node %u stays in %s on the way to operation enabled", self->options.node_id,
-             cia402_state_str(self->state));
+    snprintf(self->detail, sizeof self->detail, "node %u stays in %s on the way to operation enabled",
+             self->options.node_id, cia402_state_str(self->state));
     return drive_err_refused;
 }
 
@@ -313,12 +343,14 @@ static enum drive_status judge_cycle(struct cia402_master *self)
     return drive_ok;
 }
 
-static enum drive_status master_exchange(void *object, const struct drive_setpoint *setpoint, struct drive_sample *out_sample)
+static enum drive_status master_exchange(void *object, const struct drive_setpoint *setpoint,
+                                         struct drive_sample *out_sample)
 {
     struct cia402_master *self = object;
     *out_sample = (struct drive_sample){.valid = false};
     if (!self->armed || !setpoint_is_finite(setpoint)) {
-        snprintf(self->detail, sizeof self->detail, self->armed ? "a set-point is not a number" : "exchange before arm");
+        snprintf(self->detail, sizeof self->detail,
+                 self->armed ? "a set-point is not a number" : "exchange before arm");
         return drive_err_argument;
     }
     set_target(self, setpoint);
@@ -416,7 +448,8 @@ static const struct drive_operations operations = {
     master_open, master_arm, master_exchange, master_stop, master_close, master_counters, master_detail,
 };
 
-void cia402_master_init(struct cia402_master *self, const struct can_port *port, const struct cia402_master_options *options)
+void cia402_master_init(struct cia402_master *self, const struct can_port *port,
+                        const struct cia402_master_options *options)
 {
     memset(self, 0, sizeof *self);
     self->options = *options;

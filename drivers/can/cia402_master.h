@@ -1,14 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /// The door to a CiA 402 servo drive on a CAN port: drivers/drive.h over SDO, SYNC and mapped PDOs.
-/// One exchange is one SYNC cycle: the set-points go out as RPDOs, at the period's end SYNC follows, the TPDOs come back.
+/// One exchange is one SYNC cycle: the set-points go out as RPDOs, at the period's end SYNC follows, the TPDOs come
+/// back.
 ///   RPDO1 6040 control word, 607A target position     (torque mode: 6040, 6071 target torque)
 ///   RPDO2 60B1 velocity offset, 60B2 torque offset    (torque mode: none)      [+ 2002:1, 2002:2]
 ///   TPDO1 6041 status word, 6064 position, 6077 torque
 ///   TPDO2 606C velocity, 6074 torque demand           [+ 2001:1, 2001:2]
-/// in brackets where the drive has the end-to-end check of pdo_check.h: then a lost, late, repeated, mixed up or altered frame
-/// is always told from a good one. A drive without it is judged by arrival times and lengths alone.
-/// A sample is valid if its TPDOs came in time, belong to the SYNC of this exchange and say that the drive used the set-point
-/// of this exchange (status word bit 12). Units: those of drive.h; of a linear drive m, m/s and N.
+/// in brackets where the drive has the end-to-end check of pdo_check.h: then one lost, late, repeated, mixed up or
+/// altered frame (up to two bits) per cycle is always told from a good one, and 255 of 256 worse cases. A drive without
+/// it is judged by arrival times and lengths alone.
+/// Test: tests/api/test_can_drive.c, tests/fault/test_can_faults.c (every fault at every frame)
+/// A sample is valid if its TPDOs came in time, belong to the SYNC of this exchange and say that the drive used the
+/// set-point of this exchange (status word bit 12). Units: those of drive.h; of a linear drive m, m/s and N.
 #ifndef SERVOSCOPE_DRIVERS_CAN_CIA402_MASTER_H
 #define SERVOSCOPE_DRIVERS_CAN_CIA402_MASTER_H
 
@@ -61,13 +64,13 @@ struct cia402_master {
     struct drive_configuration configuration;
     struct cia402_scaling scaling;
     struct drive_counters counters;
-    uint32_t saturated;            ///< set-points that did not fit their object and were clipped
+    uint32_t saturated; ///< set-points that did not fit their object and were clipped
     bool opened, armed;
-    bool checked;                  ///< the drive has objects 2001 and 2002
+    bool checked; ///< the drive has objects 2001 and 2002
     uint32_t period_us;
-    uint32_t reply_us;             ///< after SYNC: TPDOs that come later are late
-    uint32_t targets_us;           ///< that the RPDOs take to get out, at worst
-    bool cycling;                  ///< SYNC is running
+    uint32_t reply_us;   ///< after SYNC: TPDOs that come later are late
+    uint32_t targets_us; ///< that the RPDOs take to get out, at worst
+    bool cycling;        ///< SYNC is running
     uint64_t next_sync_us;
     uint16_t control_word;
     struct cia402_setpoint target; ///< on its way or last sent
@@ -76,17 +79,19 @@ struct cia402_master {
     bool complete;                 ///< this cycle's TPDOs are there and good
     bool late_counted;
     bool have[2];
+    bool mixed; ///< one of them came twice in this cycle, with different content
     struct can_frame replies[2];
-    struct cia402_cycle last;      ///< last good one
-    enum cia402_state state;       ///< of the last good status word
+    struct cia402_cycle last; ///< last good one
+    enum cia402_state state;  ///< of the last good status word
     uint32_t missing_in_a_row;
-    uint32_t boot_ups;             ///< heard when the drive was opened
+    uint32_t boot_ups; ///< heard when the drive was opened
     char detail[240];
 };
 
 /// Prepares the door; nothing is sent.
 /// Lifetime: the port's object must outlive self, and self must not move.
-void cia402_master_init(struct cia402_master *self, const struct can_port *port, const struct cia402_master_options *options);
+void cia402_master_init(struct cia402_master *self, const struct can_port *port,
+                        const struct cia402_master_options *options);
 
 /// The door as everybody else sees it.
 struct drive cia402_master_drive(struct cia402_master *self);

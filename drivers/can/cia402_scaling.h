@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// From a drive's own units to SI and back, by what its objects declare. Both halves use the same few lines, so that a value
-/// means the same on both sides to the last bit.
+/// From a drive's own units to SI and back, by what its objects declare. Both halves use the same few lines, so that a
+/// value means the same on both sides to the last bit.
 #ifndef SERVOSCOPE_DRIVERS_CAN_CIA402_SCALING_H
 #define SERVOSCOPE_DRIVERS_CAN_CIA402_SCALING_H
 
@@ -17,7 +17,7 @@ enum cia402_unit {
     cia402_unit_increment = 0xB5,
 };
 
-#define CIA402_UNIT(prefix, numerator, denominator) \
+#define CIA402_UNIT(prefix, numerator, denominator)                                                                    \
     ((uint32_t)(uint8_t)(int8_t)(prefix) << 24 | (uint32_t)(numerator) << 16 | (uint32_t)(denominator) << 8)
 
 /// What the drive says.

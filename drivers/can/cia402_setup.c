@@ -14,7 +14,8 @@ struct parameter {
     uint32_t value;
 };
 
-static enum drive_status failed(struct cia402_master *self, const char *verb, const struct parameter *p, uint32_t abort_code)
+static enum drive_status failed(struct cia402_master *self, const char *verb, const struct parameter *p,
+                                uint32_t abort_code)
 {
     if (abort_code == CANOPEN_BUS_LOST) {
         snprintf(self->detail, sizeof self->detail, "node %u: the bus was lost", self->options.node_id);
@@ -29,8 +30,9 @@ static enum drive_status failed(struct cia402_master *self, const char *verb, co
         snprintf(self->detail, sizeof self->detail, "node %u: %s %04X:%u = %lu: read back as something else",
                  self->options.node_id, verb, p->index, p->subindex, (unsigned long)p->value);
     else
-        snprintf(self->detail, sizeof self->detail, "node %u: %s %04X:%u = %lu: %s (abort %08lX)", self->options.node_id, verb,
-                 p->index, p->subindex, (unsigned long)p->value, od_abort_str(abort_code), (unsigned long)abort_code);
+        snprintf(self->detail, sizeof self->detail, "node %u: %s %04X:%u = %lu: %s (abort %08lX)",
+                 self->options.node_id, verb, p->index, p->subindex, (unsigned long)p->value, od_abort_str(abort_code),
+                 (unsigned long)abort_code);
     return drive_err_refused;
 }
 
@@ -44,7 +46,8 @@ static enum drive_status write_all(struct cia402_master *self, const struct para
 {
     for (size_t i = 0; i < count; i++) {
         const struct parameter *p = &parameters[i];
-        uint32_t abort_code = canopen_master_write_surely(&self->bus, p->index, p->subindex, p->size, p->value, UINT32_MAX);
+        uint32_t abort_code =
+            canopen_master_write_surely(&self->bus, p->index, p->subindex, p->size, p->value, UINT32_MAX);
         if (abort_code != od_abort_none)
             return failed(self, "write", p, abort_code);
     }
@@ -73,9 +76,10 @@ static enum drive_status check_configuration(struct cia402_master *self, struct 
         return refuse(self, drive_err_argument, "velocity limit and following error must not be negative");
     if (!(c->sample_rate_hz > 0.0 && c->sample_rate_hz <= 20000.0) ||
         !cia402_period_encode(1.0 / c->sample_rate_hz, &units, &exponent)) {
-        snprintf(self->detail, sizeof self->detail,
-                 "sample rate %g Hz: object 60C2 holds 1..255 times a power of ten of seconds (1 kHz, 2 kHz, 1250 Hz, ..)",
-                 c->sample_rate_hz);
+        snprintf(
+            self->detail, sizeof self->detail,
+            "sample rate %g Hz: object 60C2 holds 1..255 times a power of ten of seconds (1 kHz, 2 kHz, 1250 Hz, ..)",
+            c->sample_rate_hz);
         return drive_err_argument;
     }
     *out_units = (struct parameter){cia402_interpolation_period, 1, 1, units};
@@ -96,10 +100,10 @@ static enum drive_status plan_cycle(struct cia402_master *self)
                  (unsigned long)self->options.bitrate, 100.0 * load, 100.0 * CIA402_BUS_LOAD_LIMIT);
         return drive_err_argument;
     }
-    // Before each SYNC the RPDOs have to get out, behind one foreign frame at worst. At 70 % load there is time for that:
-    // then the 30 % left are more than the 135 bits of that frame, for every cycle of at least 315 bits.
-    unsigned before_sync = cia402_master_target_bits(self->configuration.mode, self->checked) +
-                           can_frame_bits_worst(can_data_max);
+    // Before each SYNC the RPDOs have to get out, behind one foreign frame at worst. At 70 % load there is time for
+    // that: then the 30 % left are more than the 135 bits of that frame, for every cycle of at least 315 bits.
+    unsigned before_sync =
+        cia402_master_target_bits(self->configuration.mode, self->checked) + can_frame_bits_worst(can_data_max);
     self->targets_us = (uint32_t)ceil(1e6 * before_sync / self->options.bitrate);
     self->reply_us = self->period_us - self->targets_us;
     return drive_ok;
@@ -123,8 +127,9 @@ static enum drive_status identify(struct cia402_master *self)
         return status;
     bool torque = self->configuration.mode == drive_mode_torque;
     if (!(modes & (torque ? CIA402_SUPPORTS(cia402_mode_cst) : CIA402_SUPPORTS(cia402_mode_csp)))) {
-        snprintf(self->detail, sizeof self->detail, "node %u: supported modes (6502) are %08lX, without cyclic synchronous %s",
-                 self->options.node_id, (unsigned long)modes, torque ? "torque" : "position");
+        snprintf(self->detail, sizeof self->detail,
+                 "node %u: supported modes (6502) are %08lX, without cyclic synchronous %s", self->options.node_id,
+                 (unsigned long)modes, torque ? "torque" : "position");
         return drive_err_identity;
     }
     uint32_t ignored;
@@ -141,8 +146,8 @@ static enum drive_status read_scaling(struct cia402_master *self)
         uint8_t subindex;
         uint32_t *value;
     } wanted[] = {
-        {cia402_unit_position, 0, &objects.position_unit},      {cia402_unit_velocity, 0, &objects.velocity_unit},
-        {cia402_encoder_resolution, 1, &objects.increments},    {cia402_encoder_resolution, 2, &objects.revolutions},
+        {cia402_unit_position, 0, &objects.position_unit},   {cia402_unit_velocity, 0, &objects.velocity_unit},
+        {cia402_encoder_resolution, 1, &objects.increments}, {cia402_encoder_resolution, 2, &objects.revolutions},
         {cia402_rated_torque, 0, &objects.rated_torque},
     };
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
@@ -209,9 +214,9 @@ static enum drive_status write_parameters(struct cia402_master *self, struct par
 // ---- Process data
 
 struct mapping {
-    uint8_t number;     ///< 0..3
-    bool transmit;      ///< by the drive
-    uint8_t count;      ///< 0: not used, disabled
+    uint8_t number; ///< 0..3
+    bool transmit;  ///< by the drive
+    uint8_t count;  ///< 0: not used, disabled
     uint32_t entries[4];
 };
 
@@ -223,8 +228,8 @@ static enum drive_status map_pdo(struct cia402_master *self, const struct mappin
     uint16_t mapping = (uint16_t)(parameters + 0x200);
     uint32_t cob_id = (m->transmit ? 0x180u : 0x200u) + 0x100u * m->number + self->options.node_id;
     const struct parameter off = {parameters, 1, 4, cob_id | PDO_DISABLED}, on = {parameters, 1, 4, cob_id};
-    uint32_t abort_code = canopen_master_write_surely(&self->bus, off.index, off.subindex, off.size, off.value,
-                                                      ~PDO_NO_REMOTE);
+    uint32_t abort_code =
+        canopen_master_write_surely(&self->bus, off.index, off.subindex, off.size, off.value, ~PDO_NO_REMOTE);
     if (m->count == 0 && (abort_code == od_abort_no_object || abort_code == od_abort_no_subindex))
         return drive_ok; // a drive with fewer PDOs than four has nothing to disable
     if (abort_code != od_abort_none)
@@ -249,18 +254,28 @@ static enum drive_status map_process_data(struct cia402_master *self)
     const uint8_t check = self->checked ? 2 : 0;
     const uint32_t counter = MAPPED(pdo_check_target_index, 1, 8), byte = MAPPED(pdo_check_target_index, 2, 8);
     const struct mapping targets[2] = {
-        {0, false, 2, {MAPPED(cia402_control_word, 0, 16),
-                       torque ? MAPPED(cia402_target_torque, 0, 16) : MAPPED(cia402_target_position, 0, 32)}},
-        {1, false, (uint8_t)((torque ? 0 : 2) + check),
+        {0,
+         false,
+         2,
+         {MAPPED(cia402_control_word, 0, 16),
+          torque ? MAPPED(cia402_target_torque, 0, 16) : MAPPED(cia402_target_position, 0, 32)}},
+        {1,
+         false,
+         (uint8_t)((torque ? 0 : 2) + check),
          {torque ? counter : MAPPED(cia402_velocity_offset, 0, 32), torque ? byte : MAPPED(cia402_torque_offset, 0, 16),
           counter, byte}},
     };
     const struct mapping samples[2] = {
-        {0, true, 3, {MAPPED(cia402_status_word, 0, 16), MAPPED(cia402_position_actual, 0, 32),
-                      MAPPED(cia402_torque_actual, 0, 16)}},
-        {1, true, (uint8_t)(2 + check),
-         {MAPPED(cia402_velocity_actual, 0, 32), MAPPED(cia402_torque_demand, 0, 16), MAPPED(pdo_check_sample_index, 1, 8),
-          MAPPED(pdo_check_sample_index, 2, 8)}},
+        {0,
+         true,
+         3,
+         {MAPPED(cia402_status_word, 0, 16), MAPPED(cia402_position_actual, 0, 32),
+          MAPPED(cia402_torque_actual, 0, 16)}},
+        {1,
+         true,
+         (uint8_t)(2 + check),
+         {MAPPED(cia402_velocity_actual, 0, 32), MAPPED(cia402_torque_demand, 0, 16),
+          MAPPED(pdo_check_sample_index, 1, 8), MAPPED(pdo_check_sample_index, 2, 8)}},
     };
     const struct mapping unused[4] = {{2, false, 0, {0}}, {3, false, 0, {0}}, {2, true, 0, {0}}, {3, true, 0, {0}}};
     enum drive_status status = drive_ok;

@@ -28,8 +28,8 @@ struct heartbeat_consumer {
     uint32_t timeout_us; ///< 0: does not watch
     uint64_t last_us;
     enum heartbeat_life life;
-    uint8_t state;       ///< last one heard, enum nmt_state
-    uint32_t boot_ups;   ///< boot-up messages heard
+    uint8_t state;     ///< last one heard, enum nmt_state
+    uint32_t boot_ups; ///< boot-up messages heard
 };
 
 struct can_frame heartbeat_frame(uint8_t node_id, enum nmt_state state);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /// The object dictionary: what a node says of itself and what may be written, as const tables.
-/// A dictionary is a list of sections, each a table of entries and the object (owner) that their values live in, so that the
-/// communication part and the application each bring their own. Values pass as int64_t, which holds every type here.
+/// A dictionary is a list of sections, each a table of entries and the object (owner) that their values live in, so
+/// that the communication part and the application each bring their own. Values pass as int64_t, which holds every type
+/// here.
 #ifndef SERVOSCOPE_DRIVERS_CAN_OBJECT_DICTIONARY_H
 #define SERVOSCOPE_DRIVERS_CAN_OBJECT_DICTIONARY_H
 
@@ -44,9 +45,9 @@ enum od_abort {
 struct od_entry {
     uint16_t index;
     uint8_t subindex;
-    uint8_t type;     ///< enum od_type
-    uint8_t access;   ///< enum od_access, or-ed
-    size_t offset;    ///< of the value in the owner
+    uint8_t type;   ///< enum od_type
+    uint8_t access; ///< enum od_access, or-ed
+    size_t offset;  ///< of the value in the owner
     int64_t constant;
     /// Checks and stores a value that is within the type's range; returns an abort code. NULL: od_store.
     uint32_t (*write)(void *owner, const struct od_entry *entry, int64_t value);

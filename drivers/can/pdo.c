@@ -71,7 +71,7 @@ uint32_t pdo_set_cob_id(struct pdo *self, uint32_t cob_id)
     if (pdo_is_enabled(self) && !(cob_id & PDO_DISABLED) && cob_id != self->cob_id)
         return od_abort_access;
     self->cob_id = cob_id;
-    self->pending = false;
+    self->pending = self->mixed = false;
     self->syncs = 0;
     return od_abort_none;
 }
@@ -96,8 +96,10 @@ bool pdo_take(struct pdo *self, const struct can_frame *frame)
         self->wrong_length++;
         return false;
     }
-    if (self->pending)
+    if (self->pending) {
         self->repeated++;
+        self->mixed = self->mixed || memcmp(self->data, frame->data, sizeof self->data) != 0;
+    }
     memcpy(self->data, frame->data, sizeof self->data);
     self->pending = true;
     return true;
@@ -115,7 +117,7 @@ unsigned pdo_apply(struct pdo *self)
             refused++;
         at = (uint8_t)(at + size);
     }
-    self->pending = false;
+    self->pending = self->mixed = false;
     return refused;
 }
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /// Process data objects (CiA 301): a node's values in one frame, mapped at run time.
-/// Mapping order, as real drives demand it: disable the PDO, set the count to 0, write the entries, set the count, enable.
-/// Transmission types: RPDO 0..240 take effect at the next SYNC, 254 and 255 at once; TPDO 1..240 go out with every n-th SYNC.
+/// Mapping order, as real drives demand it: disable the PDO, set the count to 0, write the entries, set the count,
+/// enable. Transmission types: RPDO 0..240 take effect at the next SYNC, 254 and 255 at once; TPDO 1..240 go out with
+/// every n-th SYNC.
 #ifndef SERVOSCOPE_DRIVERS_CAN_PDO_H
 #define SERVOSCOPE_DRIVERS_CAN_PDO_H
 
@@ -14,30 +15,32 @@
 enum { pdo_entries_max = 8, pdo_per_direction = 4 };
 
 /// Bits of the COB-ID parameter.
-#define PDO_DISABLED 0x80000000u
+#define PDO_DISABLED  0x80000000u
 #define PDO_NO_REMOTE 0x40000000u
 
 enum pdo_direction { pdo_receive, pdo_transmit };
 
 struct pdo {
-    uint32_t cob_id;                       ///< 1400/1800 subindex 1
-    uint8_t transmission_type;             ///< subindex 2
-    uint8_t mapped_count;                  ///< 1600/1A00 subindex 0
-    uint32_t mapped[pdo_entries_max];      ///< index << 16 | subindex << 8 | bits
+    uint32_t cob_id;                  ///< 1400/1800 subindex 1
+    uint8_t transmission_type;        ///< subindex 2
+    uint8_t mapped_count;             ///< 1600/1A00 subindex 0
+    uint32_t mapped[pdo_entries_max]; ///< index << 16 | subindex << 8 | bits
     struct od_place places[pdo_entries_max];
-    uint8_t length;                        ///< bytes of the mapped values
-    uint8_t syncs;                         ///< since a TPDO was last sent
-    bool pending;                          ///< an RPDO's data waits for SYNC
+    uint8_t length; ///< bytes of the mapped values
+    uint8_t syncs;  ///< since a TPDO was last sent
+    bool pending;   ///< an RPDO's data waits for SYNC
+    bool mixed;     ///< and it replaced different data that waited for the same SYNC
     uint8_t data[can_data_max];
-    uint32_t wrong_length;                 ///< RPDOs that were too short for their mapping: not used
-    uint32_t repeated;                     ///< RPDOs that replaced one still waiting for SYNC
+    uint32_t wrong_length; ///< RPDOs that were too short for their mapping: not used
+    uint32_t repeated;     ///< RPDOs that replaced one still waiting for SYNC
 };
 
 bool pdo_is_enabled(const struct pdo *self);
 
 bool pdo_is_synchronous(const struct pdo *self);
 
-/// Checks a mapping entry against the dictionary: exists, mappable in this direction, the right length. Returns an abort code.
+/// Checks a mapping entry against the dictionary: exists, mappable in this direction, the right length. Returns an
+/// abort code.
 uint32_t pdo_check_entry(const struct object_dictionary *dictionary, enum pdo_direction direction, uint32_t mapped,
                          struct od_place *out_place);
 

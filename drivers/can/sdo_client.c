@@ -26,7 +26,8 @@ struct can_frame sdo_client_upload(struct sdo_client *self, uint16_t index, uint
     return frame;
 }
 
-struct can_frame sdo_client_download(struct sdo_client *self, uint16_t index, uint8_t subindex, uint8_t size, uint32_t value)
+struct can_frame sdo_client_download(struct sdo_client *self, uint16_t index, uint8_t subindex, uint8_t size,
+                                     uint32_t value)
 {
     struct can_frame frame = start(self, index, subindex, size, true);
     frame.data[0] = (uint8_t)(command_download | ((4 - size) << 2));

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "drivers/can/sdo_server.h"
 
-/// Command byte: client command specifier in bits 7..5; of a download bits 3..2 bytes unused, bit 1 expedited, bit 0 size said.
+/// Command byte: client command specifier in bits 7..5; of a download bits 3..2 bytes unused, bit 1 expedited, bit 0
+/// size said.
 enum {
     request_download = 1,
     request_upload = 2,
@@ -11,7 +12,8 @@ enum {
     answer_abort = 0x80,
 };
 
-static uint32_t download(const struct sdo_server *self, const struct can_frame *request, uint16_t index, uint8_t subindex)
+static uint32_t download(const struct sdo_server *self, const struct can_frame *request, uint16_t index,
+                         uint8_t subindex)
 {
     uint8_t command = request->data[0];
     if (!(command & 2)) // segmented

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// SDO server (CiA 301), expedited transfers: up to four bytes in one frame. Every other request is answered by an abort.
+/// SDO server (CiA 301), expedited transfers: up to four bytes in one frame. Every other request is answered by an
+/// abort.
 #ifndef SERVOSCOPE_DRIVERS_CAN_SDO_SERVER_H
 #define SERVOSCOPE_DRIVERS_CAN_SDO_SERVER_H
 

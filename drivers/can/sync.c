@@ -37,17 +37,22 @@ enum sync_result sync_consumer_take(struct sync_consumer *self, const struct can
     }
     uint8_t before = self->counter;
     bool first = !self->running;
-    if (!first && self->overflow != 0 && frame->data[0] == before) {
-        self->repeated++;
-        return sync_repeated;
+    uint32_t skipped = 0;
+    if (!first && self->overflow != 0) {
+        skipped = ((uint32_t)frame->data[0] + 2u * self->overflow - before - 1u) % self->overflow;
+        // More than half way round is an old one rather than a new one. Only with a time-out: without it, a master that
+        // counts from 1 again would be ignored for long.
+        bool old = self->period_us != 0 && skipped >= self->overflow / 2u;
+        if (old || frame->data[0] == before) {
+            self->repeated++;
+            return sync_repeated;
+        }
     }
     self->counter = frame->data[0];
     self->running = true;
     self->last_us = now_us;
-    if (self->overflow == 0 || first || self->counter == successor(before, self->overflow))
-        return sync_taken;
-    self->missed += ((uint32_t)self->counter + 2u * self->overflow - before - 1u) % self->overflow;
-    return sync_gap;
+    self->missed += skipped;
+    return skipped == 0 ? sync_taken : sync_gap;
 }
 
 uint64_t sync_consumer_deadline_us(const struct sync_consumer *self)

@@ -28,7 +28,7 @@ struct sync_consumer {
     bool running;       ///< a SYNC has come and none was missed for 1.5 periods since
     uint64_t last_us;
     uint32_t missed;    ///< SYNCs that did not come, by the counter's gaps
-    uint32_t repeated;  ///< SYNCs that came twice
+    uint32_t repeated;  ///< SYNCs that came twice or out of order
     uint32_t malformed; ///< wrong length for the counter agreed on
 };
 
@@ -36,7 +36,7 @@ enum sync_result {
     sync_none,      ///< not a SYNC
     sync_taken,     ///< the one expected
     sync_gap,       ///< a SYNC, but not the successor of the last one
-    sync_repeated,  ///< the last one once more: not to be acted on
+    sync_repeated,  ///< the last one once more, or an old one that was held up: not to be acted on
     sync_malformed, ///< a SYNC of a wrong length: not to be acted on
 };
 

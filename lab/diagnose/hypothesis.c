@@ -56,6 +56,11 @@ static void remove_coordinate(struct hypothesis *self, size_t i)
     memmove(&self->x[i], &self->x[i + 1], (self->count - i) * sizeof self->x[0]);
 }
 
+static bool belongs_to_actuator(size_t offset)
+{
+    return offset == offsetof(struct sim_model, torque_lag_s) || offset == offsetof(struct sim_model, dead_time_s);
+}
+
 static bool belongs_to_belt(size_t offset)
 {
     return offset == offsetof(struct sim_model, belt_stiffness_Nm_per_rad) ||
@@ -68,7 +73,8 @@ static void add_nuisance(struct hypothesis *self, const struct tolerance *t)
     const struct sim_model *m = &self->engaged;
     double value = field(m, t->offset);
     if (!(value > 0.0) || (belongs_to_belt(t->offset) && m->structure != sim_structure_two_mass) ||
-        find_offset(self, t->offset) != SIZE_MAX || self->count == hypothesis_coordinates_max)
+        (belongs_to_actuator(t->offset) && !self->actuator_seen) || find_offset(self, t->offset) != SIZE_MAX ||
+        self->count == hypothesis_coordinates_max)
         return;
     bool inertia = t->offset == offsetof(struct sim_model, motor_inertia_kgm2) ||
                    t->offset == offsetof(struct sim_model, load_inertia_kgm2);
@@ -95,12 +101,13 @@ static void add_nuisances(struct hypothesis *self)
         add_nuisance(self, &tolerances[i]);
 }
 
-void hypothesis_init(struct hypothesis *self, const struct sim_model *given, bool inertia_free)
+void hypothesis_init(struct hypothesis *self, const struct sim_model *given, bool inertia_free, bool actuator_seen)
 {
     memset(self, 0, sizeof *self);
     self->given = given;
     self->engaged = *given;
     self->inertia_free = inertia_free;
+    self->actuator_seen = actuator_seen;
     add_nuisances(self);
 }
 
@@ -109,6 +116,8 @@ bool hypothesis_may_name(const struct hypothesis *self, int effect)
     const struct sim_effect *e = sim_effects[effect];
     if (self->named[effect] || self->given->effect_on[effect] ||
         self->count + e->parameter_count + 2 > hypothesis_coordinates_max)
+        return false;
+    if (e->place == sim_place_actuator && !self->actuator_seen)
         return false;
     bool free_inertia = e->parameters[0].model_offset == offsetof(struct sim_model, load_inertia_kgm2) && self->inertia_free;
     return !free_inertia && (!e->applies || e->applies(self->given));

@@ -33,6 +33,7 @@ struct coordinate {
 struct hypothesis {
     const struct sim_model *given;
     bool inertia_free;       ///< no model was given: the rigid body's inertia has no prior and no box
+    bool actuator_seen;      ///< the recordings have a torque reference: what lies between it and the torque can show
     bool named[sim_effects_max];
     size_t count;
     struct coordinate coordinates[hypothesis_coordinates_max];
@@ -41,7 +42,7 @@ struct hypothesis {
 };
 
 /// Starts with the given model: no cause, its own numbers as nuisances.
-void hypothesis_init(struct hypothesis *self, const struct sim_model *given, bool inertia_free);
+void hypothesis_init(struct hypothesis *self, const struct sim_model *given, bool inertia_free, bool actuator_seen);
 
 /// Whether an effect may be added at all (not named yet, applicable, room left).
 bool hypothesis_may_name(const struct hypothesis *self, int effect);

@@ -207,6 +207,21 @@ static bool add_best(const struct fit_data *data, const struct sim_coverage *cov
     return best > 0.0;
 }
 
+bool search_add(const struct fit_data *data, const struct sim_coverage *coverage, int effect, struct hypothesis *io_hypothesis,
+                struct fit *io_fit)
+{
+    struct candidate candidate;
+    struct fit scratch;
+    if (!fit_init(&scratch, data))
+        return false;
+    bool found = scan_effect(&scratch, data, coverage, io_hypothesis, io_fit, effect, &candidate);
+    fit_free(&scratch);
+    if (!found)
+        return false;
+    *io_hypothesis = candidate.hypothesis;
+    return fit_run(io_fit, data, io_hypothesis, refine_iterations);
+}
+
 double search_evidence(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit, int effect)
 {
     struct hypothesis without = *hypothesis;

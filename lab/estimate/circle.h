@@ -22,10 +22,12 @@ struct circle circle_of_column(const double complex *values, size_t rows, size_t
 /// 1 if the mean is zero.
 double circle_chance_of_zero(const struct circle *self);
 
-/// Returns the factor c for which |x - mean| <= c std holds with the given probability, std = sqrt(E|mean - x|^2) being
-/// estimated with dof_complex complex degrees of freedom (M - 1 for M periods): c^2 is the quantile of F(2, 2
-/// dof_complex), in closed form dof ((1-p)^(-1/dof) - 1). c^2 = 3.555 at 95 % and M = 10; 2.996 = -ln 0.05 in the
-/// limit. NaN out of range.
+/// Returns the factor c for which |error| <= c std holds with the given probability.
+/// std = sqrt(E|error|^2) is itself an estimate, with dof_complex complex degrees of freedom (M - 1 for M periods).
+///
+/// Equation: c^2 = quantile of F(2, 2 dof) = dof ((1 - p)^(-1/dof) - 1)
+///           3.555 at 95 % and M = 10, -ln 0.05 = 2.996 without limit
+/// Range:    0 < probability < 1, dof_complex > 0 (not only whole numbers); NaN outside
 double circle_confidence_factor(double probability, double dof_complex);
 
 #endif

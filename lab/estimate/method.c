@@ -127,10 +127,13 @@ void estimate_set_line(struct frf *io_frf, size_t line, double complex response,
 static const char *settle_source_name(enum periodic_settle source)
 {
     switch (source) {
-    case periodic_settle_given: return "option";
-    case periodic_settle_key: return "settle_periods of the run";
+    case periodic_settle_given:
+        return "option";
+    case periodic_settle_key:
+        return "settle_periods of the run";
     case periodic_settle_auto:
-    case periodic_settle_default: break;
+    case periodic_settle_default:
+        break;
     }
     return "decay of the transient";
 }

@@ -17,6 +17,8 @@ static const double share_of_missing = 0.1;
 static const double tolerated_drift_samples = 0.25;
 static const double rounding_power = 1e-24;
 static const double smallest_line = 0.01;
+/// Excited lines stand this far above those that a loop or a nonlinearity makes of them.
+static const double clear_gap = 3.0;
 static const double chance_of_false_line = 1e-6;
 
 static size_t power_of_two_from(size_t least)
@@ -156,21 +158,61 @@ enum period_search_status period_search_run(const double *signal, size_t rows, s
     return status;
 }
 
-size_t period_search_bins(const double complex *spectra, size_t periods, size_t bin_total, size_t stride,
-                          uint32_t *out_bins)
+static int compare_falling(const void *left, const void *right)
 {
+    double a = *(const double *)left;
+    double b = *(const double *)right;
+    return (a < b) - (a > b);
+}
+
+/// The magnitude in the middle of the widest gap between lines; 0 if no gap is as wide as `clear_gap`.
+static double gap_below_excited(double *magnitudes, size_t count)
+{
+    double widest = clear_gap;
+    double middle = 0.0;
+    qsort(magnitudes, count, sizeof *magnitudes, compare_falling);
+    for (size_t i = 1; i < count; i++) {
+        if (magnitudes[i - 1] > widest * magnitudes[i]) {
+            widest = magnitudes[i - 1] / magnitudes[i];
+            middle = sqrt(magnitudes[i - 1] * magnitudes[i]);
+        }
+    }
+    return middle;
+}
+
+/// Magnitude of a bin's mean; 0 if its scatter could explain it.
+static double certain_magnitude(const double complex *spectra, size_t periods, size_t stride, size_t bin)
+{
+    struct circle line = circle_of_column(spectra, periods, stride, bin);
+    return circle_chance_of_zero(&line) < chance_of_false_line ? cabs(line.mean) : 0.0;
+}
+
+bool period_search_bins(const double complex *spectra, size_t periods, size_t bin_total, size_t stride,
+                        uint32_t *out_bins, size_t *out_count)
+{
+    *out_count = 0;
+    double *magnitudes = malloc(2 * bin_total * sizeof *magnitudes);
+    if (!magnitudes) {
+        return false;
+    }
+    double *candidates = magnitudes + bin_total;
     double largest = 0.0;
     for (size_t k = 1; k < bin_total; k++) {
-        struct circle line = circle_of_column(spectra, periods, stride, k);
-        largest = fmax(largest, cabs(line.mean));
+        magnitudes[k] = certain_magnitude(spectra, periods, stride, k);
+        largest = fmax(largest, magnitudes[k]);
     }
     size_t count = 0;
     for (size_t k = 1; k < bin_total; k++) {
-        struct circle line = circle_of_column(spectra, periods, stride, k);
-        bool large = largest > 0.0 && cabs(line.mean) >= smallest_line * largest;
-        if (large && circle_chance_of_zero(&line) < chance_of_false_line) {
-            out_bins[count++] = (uint32_t)k;
+        if (magnitudes[k] > 0.0 && magnitudes[k] >= smallest_line * largest) {
+            candidates[count++] = magnitudes[k];
         }
     }
-    return count;
+    double least = fmax(gap_below_excited(candidates, count), smallest_line * largest);
+    for (size_t k = 1; k < bin_total; k++) {
+        if (magnitudes[k] > 0.0 && magnitudes[k] >= least) {
+            out_bins[(*out_count)++] = (uint32_t)k;
+        }
+    }
+    free(magnitudes);
+    return true;
 }

@@ -4,6 +4,7 @@
 #define SERVOSCOPE_ESTIMATE_PERIOD_SEARCH_H
 
 #include <complex.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -31,13 +32,15 @@ struct period_search {
 enum period_search_status period_search_run(const double *signal, size_t rows, struct period_search *out_search);
 
 /// Finds the excited bins from the input's spectra at all bins.
-/// A bin is excited if its mean over periods is at least 1 % of the largest bin's, and if its scatter from period to
-/// period cannot explain it (F test at 1e-6, two periods or more). The mean (bin 0) is never one.
+/// A bin is a candidate if its mean over periods is at least 1 % of the largest bin's, and if its scatter from period
+/// to period cannot explain it (F test at 1e-6, two periods or more). In a loop other bins repeat too, as distortion:
+/// where the candidates' sizes have a gap of a factor 3 or more, only those above the widest one are excited. The mean
+/// (bin 0) is never one.
 ///
-/// Shapes:    spectra: periods x stride, of which the first bin_total bins are looked at; out_bins: bin_total
-///
-/// Returns the number of bins found.
-size_t period_search_bins(const double complex *spectra, size_t periods, size_t bin_total, size_t stride,
-                          uint32_t *out_bins);
+/// Shapes: spectra: periods x stride, of which the first bin_total bins are looked at; out_bins: bin_total
+/// Errors: false if memory is short
+/// Test:   tests/unit/test_period_search.c
+bool period_search_bins(const double complex *spectra, size_t periods, size_t bin_total, size_t stride,
+                        uint32_t *out_bins, size_t *out_count);
 
 #endif

@@ -83,7 +83,8 @@ static int choose_period(struct periodic *self, size_t wanted, struct error *out
         return error_set(out_error, error_refused,
                          "%s: the file has no key period_samples, and %s does not repeat itself: say --period SAMPLES",
                          run->path, self->input);
-    case period_search_err_memory: break;
+    case period_search_err_memory:
+        break;
     }
     return refuse_memory(run, out_error);
 }
@@ -118,13 +119,14 @@ static int find_bins(struct periodic *self, struct error *out_error)
     /* The first period holds the transient: it would only add scatter. */
     size_t first = self->total > 2 ? 1 : 0;
     const double *signal = run_column(run, self->input) + first * self->period_samples;
-    if (!spectra || !self->bins || !spectra_transform_all(signal, self->period_samples, self->total - first, spectra)) {
-        free(spectra);
+    size_t counted = self->total - first;
+    bool done = spectra && self->bins && spectra_transform_all(signal, self->period_samples, counted, spectra) &&
+                period_search_bins(spectra, counted, (self->period_samples + 1) / 2, all, self->bins, &self->bin_count);
+    free(spectra);
+    if (!done) {
         return refuse_memory(run, out_error);
     }
-    self->bin_count = period_search_bins(spectra, self->total - first, (self->period_samples + 1) / 2, all, self->bins);
     self->bins_found = true;
-    free(spectra);
     if (self->bin_count == 0) {
         return error_set(
             out_error, error_refused,
@@ -198,10 +200,16 @@ static void choose_settle(struct periodic *self, const struct periodic_options *
         self->settle_source = self->run->has_settle_periods ? periodic_settle_key : periodic_settle_auto;
     }
     switch (self->settle_source) {
-    case periodic_settle_given: self->settle = options->settle_periods; break;
-    case periodic_settle_key: self->settle = self->run->settle_periods; break;
+    case periodic_settle_given:
+        self->settle = options->settle_periods;
+        break;
+    case periodic_settle_key:
+        self->settle = self->run->settle_periods;
+        break;
     case periodic_settle_auto:
-    case periodic_settle_default: self->settle = self->transient.periods; break;
+    case periodic_settle_default:
+        self->settle = self->transient.periods;
+        break;
     }
 }
 

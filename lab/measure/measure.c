@@ -13,6 +13,8 @@
 static const double shortest_ramp_s = 0.05;
 static const double longest_ramp_s = 10.0;
 enum { default_lost_in_a_row = 20 };
+/// Room for friction and for the controllers above the table's own torque where nobody has set a limit.
+static const double default_torque_margin = 3.0;
 
 static double rate_hz(const struct msgen_table *table)
 {
@@ -146,7 +148,8 @@ static void describe_trip(const struct guard_real *guard, bool linear, char *out
         snprintf(out_text, size, "stuck: the axis does not move under %.6g %s", value, linear ? "N" : "Nm");
         return;
     case guard_cause_sensor:
-    case guard_cause_none: break;
+    case guard_cause_none:
+        break;
     }
     snprintf(out_text, size, "sensor: a measured value is not a number (%g)", value);
 }
@@ -254,10 +257,12 @@ static int arm(struct loop *self, struct error *out_error)
 static int open_drive(struct loop *self, struct error *out_error)
 {
     const struct measure_plan *plan = self->plan;
+    bool limited = plan->limits.torque_max_Nm < CORE_REAL_MAX;
+    double peak = peak_of(plan->table, msgen_channel_torque);
     struct drive_configuration configuration = {
         .mode = plan->mode,
         .sample_rate_hz = rate_hz(plan->table),
-        .torque_limit_Nm = plan->limits.torque_max_Nm < CORE_REAL_MAX ? plan->limits.torque_max_Nm : 0.0,
+        .torque_limit_Nm = limited ? plan->limits.torque_max_Nm : default_torque_margin * peak,
         .velocity_limit_rad_per_s =
             plan->limits.velocity_max_rad_per_s < CORE_REAL_MAX ? plan->limits.velocity_max_rad_per_s : 0.0,
         .following_error_rad = plan->following_error_rad,
@@ -280,7 +285,9 @@ static int prepare(struct loop *self, struct error *out_error)
     };
     enum core_status status = guard_real_init(&self->guard, &limits);
     if (status == core_ok) {
-        status = msgen_player_init(&self->player, plan->table, &config);
+        bool floats = plan->table->format == msgen_format_f32;
+        status = floats ? msgen_player_init_f32(&self->player, plan->table, &config)
+                        : msgen_player_init(&self->player, plan->table, &config);
     }
     if (status != core_ok) {
         return error_set(out_error, error_refused, "measurement: %s", core_status_str(status));
@@ -314,6 +321,9 @@ static int finish_run(struct loop *self, struct run *out_run, struct error *out_
     };
     if (!recorder_finish(&self->recorder, &facts, out_run)) {
         return error_set(out_error, error_refused, "not enough memory to keep %zu samples", report->rows);
+    }
+    if (report->rows == 0) {
+        run_free(out_run);
     }
     return 0;
 }

@@ -28,12 +28,14 @@ struct measure_plan {
     const struct msgen_table *table; ///< torque, velocity and position for the cascade, at least torque in torque mode
     enum drive_mode mode;
     uint32_t settle_periods;
-    uint32_t periods;                ///< >= 1
-    uint32_t fade_samples;           ///< length of the fade in and of the fade out; 0: measure_ramp_samples
-    uint32_t abort_samples;          ///< length of the ramp down on a stop; 0: measure_ramp_samples
-    uint32_t lost_in_a_row_max;      ///< more lost samples than this one after the other stop the measurement; 0: 20
-    struct guard_real_limits limits; ///< GUARD_REAL_LIMITS_NONE where none are wanted; watchdog_samples is overwritten
-    double following_error_rad;      ///< > 0: set in the drive
+    uint32_t periods;           ///< >= 1
+    uint32_t fade_samples;      ///< length of the fade in and of the fade out; 0: measure_ramp_samples
+    uint32_t abort_samples;     ///< length of the ramp down on a stop; 0: measure_ramp_samples
+    uint32_t lost_in_a_row_max; ///< more lost samples than this one after the other stop the measurement; 0: 20
+    /// GUARD_REAL_LIMITS_NONE where none are wanted; watchdog_samples is overwritten. Torque and speed limits are set
+    /// in the drive too; without a torque limit the drive gets 3 times the table's largest torque.
+    struct guard_real_limits limits;
+    double following_error_rad; ///< > 0: set in the drive
     /// Set to non-zero from a signal handler or another thread: ramp down and stop. NULL: nobody asks.
     const volatile sig_atomic_t *stop_requested;
     /// Called after each sample, from the loop: has to return fast. NULL: nobody looks.
@@ -74,7 +76,8 @@ int measure_check(const struct measure_plan *plan, struct error *out_error);
 /// Bound:  the set-points never step by more than the table does plus 1.5 max|x| / (length of the ramp), the stop
 /// included;
 ///         the last one sent is 0. A drive that fails is not sent set-points any more: it is told to stop.
-/// Returns 0 if complete; else an error, and *out_run holds what was measured if out_run->rows > 0.
+/// Returns 0 if complete; else an error. *out_run then holds what was measured; it is empty, with nothing to free, if
+/// out_run->rows is 0.
 /// Test:   tests/unit/test_measure.c
 int measure_run(const struct drive *drive, const struct measure_plan *plan, struct run *out_run,
                 struct measure_report *out_report, struct error *out_error);

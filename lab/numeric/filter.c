@@ -76,15 +76,15 @@ static void reverse(size_t n, double *x)
     }
 }
 
-void filter_zero_phase(const struct filter *self, size_t samples, double *x)
+bool filter_zero_phase(const struct filter *self, size_t samples, double *x)
 {
-    size_t pad = 3 * (2 * self->sections + 1);
+    size_t pad = 6 * self->sections;
     if (samples <= pad)
-        return;
+        return false;
     size_t n = samples + 2 * pad;
     double *work = malloc(n * sizeof *work);
     if (!work)
-        return;
+        return false;
     for (size_t i = 0; i < pad; i++) {
         work[i] = 2.0 * x[0] - x[pad - i];
         work[pad + samples + i] = 2.0 * x[samples - 1] - x[samples - 2 - i];
@@ -97,4 +97,5 @@ void filter_zero_phase(const struct filter *self, size_t samples, double *x)
     }
     memcpy(x, work + pad, samples * sizeof *x);
     free(work);
+    return true;
 }

@@ -53,7 +53,7 @@ double axis_map(const struct axis *self, double value);
 /// Finds ticks: steps of 1, 2 or 5 times a power of ten (or parts of a turn), decades with 2..9 as minor ticks.
 /// Range:     target: about how many labels there is room for, >= 2
 /// Ticks come in ascending order, three labels at least where a step of this kind allows. A log axis shorter than .7
-/// decades gets the ticks of a linear one. Test:      tests/unit/test_page.c
+/// decades gets the ticks of a linear one. Test:      tests/unit/test_axis.c
 void axis_find_ticks(const struct axis *self, size_t target, struct axis_ticks *out_ticks);
 
 #endif

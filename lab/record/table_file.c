@@ -41,9 +41,8 @@ void table_free(struct table *self)
     *self = (struct table){0};
 }
 
-int table_alloc(struct table *out_table, uint32_t samples, uint32_t channels, uint32_t bin_count, struct error *out_error)
+static int check_sizes(uint32_t samples, uint32_t channels, uint32_t bin_count, struct error *out_error)
 {
-    *out_table = (struct table){0};
     if (samples < 4 || samples > SERVOSCOPE_TABLE_SAMPLES_MAX)
         return error_set(out_error, error_refused, "a table of %" PRIu32 " samples: 4 to %d were expected", samples,
                          SERVOSCOPE_TABLE_SAMPLES_MAX);
@@ -53,6 +52,15 @@ int table_alloc(struct table *out_table, uint32_t samples, uint32_t channels, ui
         return error_set(out_error, error_refused,
                          "a table of %" PRIu32 " samples with %" PRIu32 " excited bins: 1 to %" PRIu32 " were expected",
                          samples, bin_count, (samples - 1) / 2);
+    return error_none;
+}
+
+int table_alloc(struct table *out_table, uint32_t samples, uint32_t channels, uint32_t bin_count,
+                struct error *out_error)
+{
+    *out_table = (struct table){0};
+    if (check_sizes(samples, channels, bin_count, out_error) != error_none)
+        return error_refused;
     out_table->samples = samples;
     out_table->channels = channels;
     out_table->bin_count = bin_count;
@@ -90,7 +98,8 @@ int table_set_rate(struct table *self, double rate_hz, struct error *out_error)
         rest = 1 / (rest - whole);
     }
     if (!(num >= 1 && den >= 1 && fabs(num / den - rate_hz) <= 1e-9 * rate_hz))
-        return error_set(out_error, error_refused, "sampling rate of %.17g Hz is no fraction of 32-bit numbers", rate_hz);
+        return error_set(out_error, error_refused, "sampling rate of %.17g Hz is no fraction of 32-bit numbers",
+                         rate_hz);
     self->rate_num_hz = (uint32_t)num;
     self->rate_den = (uint32_t)den;
     return error_none;
@@ -128,8 +137,8 @@ static void describe_scale(char *detail, const struct msgen_table *view)
 }
 
 /* Faults of the file as a whole. */
-static void describe_envelope(enum core_status status, const uint8_t *bytes, size_t size, const struct msgen_table *view,
-                              char *detail)
+static void describe_envelope(enum core_status status, const uint8_t *bytes, size_t size,
+                              const struct msgen_table *view, char *detail)
 {
     switch (status) {
     case core_err_table_truncated:
@@ -214,8 +223,8 @@ static int refuse(const char *path, enum core_status status, const uint8_t *byte
     }
     if (!detail[0])
         describe_field(status, view, detail);
-    return error_set(out_error, error_refused, "%s: %s%s%s%s", path, place, core_status_str(status), detail[0] ? ": " : "",
-                     detail);
+    return error_set(out_error, error_refused, "%s: %s%s%s%s", path, place, core_status_str(status),
+                     detail[0] ? ": " : "", detail);
 }
 
 /* The whole file, or as much of it as shows that it is longer than any table. */
@@ -282,8 +291,8 @@ static int copy_view(const char *path, const struct msgen_table *view, struct ta
             data[c][n] = sample_of(view, n, c);
             if (!isfinite(data[c][n])) {
                 table_free(out_table);
-                return error_set(out_error, error_refused, "%s: %s: sample %" PRIu32 " times its scale is not finite", path,
-                                 channel_names[c], n);
+                return error_set(out_error, error_refused, "%s: %s: sample %" PRIu32 " times its scale is not finite",
+                                 path, channel_names[c], n);
             }
         }
     }
@@ -311,8 +320,9 @@ static int check_resolution(const char *path, const struct table *self, uint32_t
     if (peak == 0 || counts >= counts_min)
         return error_none;
     return error_set(out_error, error_refused,
-                     "%s: %s: its peak is %g counts of %g: at least %g were expected, use a smaller scale than %g", path,
-                     channel_names[channel], counts, count_max(self->format), counts_min, (double)self->scale[channel]);
+                     "%s: %s: its peak is %g counts of %g: at least %g were expected, use a smaller scale than %g",
+                     path, channel_names[channel], counts, count_max(self->format), counts_min,
+                     (double)self->scale[channel]);
 }
 
 int table_file_read(const char *path, struct table *out_table, struct error *out_error)
@@ -346,8 +356,9 @@ static int choose_scale(const char *path, struct table *self, uint32_t channel, 
     }
     double exact = peak / count_max(self->format);
     if (!(exact >= FLT_MIN && exact <= FLT_MAX / 2))
-        return error_set(out_error, error_refused, "%s: %s: a peak of %g: %g to %g was expected", path, channel_names[channel],
-                         peak, FLT_MIN * count_max(self->format), FLT_MAX * (count_max(self->format) / 2));
+        return error_set(out_error, error_refused, "%s: %s: a peak of %g: %g to %g was expected", path,
+                         channel_names[channel], peak, FLT_MIN * count_max(self->format),
+                         FLT_MAX * (count_max(self->format) / 2));
     float scale = (float)exact;
     if ((double)scale < exact)
         scale = nextafterf(scale, INFINITY);
@@ -363,8 +374,8 @@ static int prepare_channel(const char *path, struct table *self, uint32_t channe
                          channel_names[channel], self->channels);
     for (uint32_t n = 0; n < self->samples; n++)
         if (!isfinite(data[n]))
-            return error_set(out_error, error_refused, "%s: %s: sample %" PRIu32 " is %g, a finite number was expected", path,
-                             channel_names[channel], n, data[n]);
+            return error_set(out_error, error_refused, "%s: %s: sample %" PRIu32 " is %g, a finite number was expected",
+                             path, channel_names[channel], n, data[n]);
     if (self->scale[channel] == 0 &&
         choose_scale(path, self, channel, peak_of(data, self->samples), out_error) != error_none)
         return error_refused;
@@ -376,8 +387,8 @@ static int prepare_channel(const char *path, struct table *self, uint32_t channe
         double count = data[n] / (double)self->scale[channel];
         if (!(fabs(self->format == msgen_format_f32 ? count : rint(count)) <= most))
             return error_set(out_error, error_refused,
-                             "%s: %s: sample %" PRIu32 " is %g: at most %g fits its number format at a scale of %g", path,
-                             channel_names[channel], n, data[n], most * (double)self->scale[channel],
+                             "%s: %s: sample %" PRIu32 " is %g: at most %g fits its number format at a scale of %g",
+                             path, channel_names[channel], n, data[n], most * (double)self->scale[channel],
                              (double)self->scale[channel]);
     }
     return check_resolution(path, self, channel, out_error);
@@ -516,8 +527,9 @@ int table_file_write_csv(const char *path, struct table *self, struct error *out
     free(bytes);
     for (uint32_t n = 0; self->acceleration && n < self->samples; n++)
         if (!isfinite(self->acceleration[n]))
-            return error_set(out_error, error_refused, "%s: acceleration: sample %" PRIu32 " is %g, a finite number was expected",
-                             path, n, self->acceleration[n]);
+            return error_set(out_error, error_refused,
+                             "%s: acceleration: sample %" PRIu32 " is %g, a finite number was expected", path, n,
+                             self->acceleration[n]);
     double *sample_index = malloc(self->samples * sizeof *sample_index);
     if (!sample_index)
         return error_set(out_error, error_refused, "%s: memory is short for %" PRIu32 " samples", path, self->samples);
@@ -565,7 +577,8 @@ static void write_array(FILE *stream, const char *name, const char *macro, const
     fprintf(stream, "\n};\n");
 }
 
-static void write_header_text(FILE *stream, const char *path, const struct table *self, const uint8_t *bytes, size_t size)
+static void write_header_text(FILE *stream, const char *path, const struct table *self, const uint8_t *bytes,
+                              size_t size)
 {
     char name[identifier_size], macro[identifier_size];
     make_identifier(path, false, name);
@@ -579,8 +592,8 @@ static void write_header_text(FILE *stream, const char *path, const struct table
         const char *name;
         uint32_t value;
     } constants[] = {
-        {"RATE_NUM_HZ", self->rate_num_hz}, {"RATE_DEN", self->rate_den},       {"PERIOD_SAMPLES", self->samples},
-        {"CHANNELS", self->channels},       {"BIN_COUNT", self->bin_count},     {"START_INDEX", self->start_index},
+        {"RATE_NUM_HZ", self->rate_num_hz}, {"RATE_DEN", self->rate_den},   {"PERIOD_SAMPLES", self->samples},
+        {"CHANNELS", self->channels},       {"BIN_COUNT", self->bin_count}, {"START_INDEX", self->start_index},
         {"BYTES", (uint32_t)size},
     };
     for (size_t i = 0; i < sizeof constants / sizeof constants[0]; i++)

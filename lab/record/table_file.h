@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/// Multisine tables on the host: one period of torque, velocity, position and acceleration in SI units, and the three files
-/// that `design` writes of it. The bytes of an .mst file are defined in lib/msgen/table.h.
+/// Multisine tables on the host: one period of torque, velocity, position and acceleration in SI units, and the three
+/// files that `design` writes of it. The bytes of an .mst file are defined in lib/msgen/table.h.
 ///
-/// All three files of a table carry the same CRC-32 (`table_crc32`, the one of the .mst header, which covers everything), and
-/// so does every run made with it.
+/// All three files of a table carry the same CRC-32 (`table_crc32`, the one of the .mst header, which covers
+/// everything), and so does every run made with it.
 #ifndef SERVOSCOPE_RECORD_TABLE_FILE_H
 #define SERVOSCOPE_RECORD_TABLE_FILE_H
 
@@ -24,17 +24,18 @@ struct table {
     double *position;               ///< NULL below 3 channels
     double *acceleration;           ///< goes into the CSV only; may be NULL
     uint32_t bin_count;
-    uint32_t *bins;                 ///< excited bins, strictly ascending from 1, below N/2; owned
-    uint32_t start_index;           ///< sample at which playing begins
-    enum msgen_format format;       ///< 0: i32
-    float scale[msgen_channels_max];///< SI per count; 0: chosen when written, so that the peak fills the format
+    uint32_t *bins;                  ///< excited bins, strictly ascending from 1, below N/2; owned
+    uint32_t start_index;            ///< sample at which playing begins
+    enum msgen_format format;        ///< 0: i32
+    float scale[msgen_channels_max]; ///< SI per count; 0: chosen when written, so that the peak fills the format
     bool linear;
-    uint32_t crc32;                 ///< set by reading and by every write
+    uint32_t crc32; ///< set by reading and by every write
 };
 
 /// Allocates zeroed arrays for `channels` channels and the acceleration, and sets the sizes; other fields are zero.
 /// Errors: error_refused for sizes out of the format's range or when memory is short; *out_table is empty then.
-int table_alloc(struct table *out_table, uint32_t samples, uint32_t channels, uint32_t bin_count, struct error *out_error);
+int table_alloc(struct table *out_table, uint32_t samples, uint32_t channels, uint32_t bin_count,
+                struct error *out_error);
 
 /// Sets the rate as the fraction with the smallest denominator that equals rate_hz to 1e-12 (1000, 8000/3, 44100/1001).
 /// Errors: error_refused if rate_hz is not a number from 1e-6 to 4e9 Hz
@@ -50,17 +51,18 @@ int table_file_read(const char *path, struct table *out_table, struct error *out
 /// Writes an .mst file, and sets scale[] where it was 0, format where it was 0, and crc32.
 /// Quantisation: x = scale * count, rounded to nearest. A chosen scale puts the largest |x| of a channel on the largest
 ///               count of the format, so values written are off by at most peak / 65534 (i16) or peak / 4.3e9 (i32).
-/// Errors: error_refused, nothing written: a value that is not finite, does not fit its format at the given scale, or leaves
+/// Errors: error_refused, nothing written: a value that is not finite, does not fit its format at the given scale, or
+/// leaves
 ///         a channel with fewer than 127 counts; sizes, rate, bins, start index out of range
 int table_file_write_mst(const char *path, struct table *self, struct error *out_error);
 
-/// Writes the table as text: `n,torque_Nm,position_rad,velocity_rad_per_s,acceleration_rad_per_s2` (what is there of it; the
-/// linear twins if self->linear), keys sample_rate_hz, period_samples, excited_bins, start_index, table_crc32 before. The
-/// values are the exact ones, before quantisation. Errors and effects on *self as table_file_write_mst().
+/// Writes the table as text: `n,torque_Nm,position_rad,velocity_rad_per_s,acceleration_rad_per_s2` (what is there of
+/// it; the linear twins if self->linear), keys sample_rate_hz, period_samples, excited_bins, start_index, table_crc32
+/// before. The values are the exact ones, before quantisation. Errors and effects on *self as table_file_write_mst().
 int table_file_write_csv(const char *path, struct table *self, struct error *out_error);
 
-/// Writes the bytes of the .mst file as a const C array for a firmware's flash, to be opened with msgen_table_open(). C99 and
-/// C++; names are made of the file's name. Errors and effects on *self as table_file_write_mst().
+/// Writes the bytes of the .mst file as a const C array for a firmware's flash, to be opened with msgen_table_open().
+/// C99 and C++; names are made of the file's name. Errors and effects on *self as table_file_write_mst().
 int table_file_write_header(const char *path, struct table *self, struct error *out_error);
 
 /// Frees all arrays and empties *self; harmless on an empty one.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// Compile-time options of lib/, all of them. Define one on the compiler's command line to change it; a value out of range
-/// does not compile. Every translation unit of one program has to see the same values.
+/// Compile-time options of lib/, all of them. Define one on the compiler's command line to change it; a value out of
+/// range does not compile. Every translation unit of one program has to see the same values.
 #ifndef SERVOSCOPE_CORE_CONFIG_H
 #define SERVOSCOPE_CORE_CONFIG_H
 
@@ -37,8 +37,8 @@
 #error "SERVOSCOPE_FRF_CHANNELS_MAX: 1 .. 8 channels"
 #endif
 
-/// Length of the partial sums of the float DFT, in samples. Range 8 .. 1024; 64 is near the best of all N in use, because
-/// rounding grows with the length of a block and with the number of blocks.
+/// Length of the partial sums of the float DFT, in samples. Range 8 .. 1024; 64 is near the best of all N in use,
+/// because rounding grows with the length of a block and with the number of blocks.
 #ifndef SERVOSCOPE_FRF_BLOCK
 #define SERVOSCOPE_FRF_BLOCK 64
 #endif
@@ -46,8 +46,8 @@
 #error "SERVOSCOPE_FRF_BLOCK: 8 .. 1024 samples"
 #endif
 
-/// Width of the floating-point type of everything outside the sample path (period statistics, FRF, the guard in SI units):
-/// 64 is double, 32 is float for parts with a single-precision FPU.
+/// Width of the floating-point type of everything outside the sample path (period statistics, FRF, the guard in SI
+/// units): 64 is double, 32 is float for parts with a single-precision FPU.
 #ifndef SERVOSCOPE_REAL_BITS
 #define SERVOSCOPE_REAL_BITS 64
 #endif
@@ -55,8 +55,8 @@
 #error "SERVOSCOPE_REAL_BITS: 32 or 64"
 #endif
 
-/// Keeps the compiler from moving memory accesses across it: between an interrupt that writes and a main loop that reads
-/// on the same core nothing more is needed. On several cores define it as the part's data memory barrier.
+/// Keeps the compiler from moving memory accesses across it: between an interrupt that writes and a main loop that
+/// reads on the same core nothing more is needed. On several cores define it as the part's data memory barrier.
 #ifndef SERVOSCOPE_MEMORY_BARRIER
 #if defined(__GNUC__)
 #define SERVOSCOPE_MEMORY_BARRIER() __asm__ volatile("" ::: "memory")

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/// The status of every set-up function in lib/: one list, so that a drive can report any of them as one number on a bus.
-/// 0 is success, all others are negative and keep their number. A function that returns one has changed nothing unless
-/// its doc block says so. The sample-rate path has no status: it saturates, counts and marks.
+/// The status of every set-up function in lib/: one list, so that a drive can report any of them as one number on a
+/// bus. 0 is success, all others are negative and keep their number. A function that returns one has changed nothing
+/// unless its doc block says so. The sample-rate path has no status: it saturates, counts and marks.
 #ifndef SERVOSCOPE_CORE_STATUS_H
 #define SERVOSCOPE_CORE_STATUS_H
 
 enum core_status {
     core_ok = 0,
-    core_err_argument = -1,        ///< a null pointer, or a value that only a programming error can produce
-    core_err_storage = -2,         ///< the storage passed in is too small
+    core_err_argument = -1, ///< a null pointer, or a value that only a programming error can produce
+    core_err_storage = -2,  ///< the storage passed in is too small
 
     core_err_table_truncated = -10, ///< fewer bytes than the header says, or than a header has
     core_err_table_trailing = -11,  ///< more bytes than the header says
@@ -30,21 +30,21 @@ enum core_status {
     core_err_table_start = -27,     ///< start index at or above N
     core_err_table_sample = -28,    ///< a float sample that is not finite
 
-    core_err_player_format = -40,   ///< table in the number format of the other path (integer, float)
-    core_err_player_fade = -41,     ///< fade or abort ramp too long, or an abort ramp of no length
-    core_err_player_periods = -42,  ///< no periods
-    core_err_player_limit = -43,    ///< output limit negative
+    core_err_player_format = -40,  ///< table in the number format of the other path (integer, float)
+    core_err_player_fade = -41,    ///< fade or abort ramp too long, or an abort ramp of no length
+    core_err_player_periods = -42, ///< no periods
+    core_err_player_limit = -43,   ///< output limit negative
 
-    core_err_frf_period = -50,      ///< N outside 4 .. SERVOSCOPE_FRF_PERIOD_MAX, or not that of the twiddle table
-    core_err_frf_bins = -51,        ///< no bins, too many, not strictly ascending from 1, or at or above N/2
-    core_err_frf_channels = -52,    ///< not 1 .. SERVOSCOPE_FRF_CHANNELS_MAX
-    core_err_frf_rails = -53,       ///< saturation thresholds in the wrong order
+    core_err_frf_period = -50,   ///< N outside 4 .. SERVOSCOPE_FRF_PERIOD_MAX, or not that of the twiddle table
+    core_err_frf_bins = -51,     ///< no bins, too many, not strictly ascending from 1, or at or above N/2
+    core_err_frf_channels = -52, ///< not 1 .. SERVOSCOPE_FRF_CHANNELS_MAX
+    core_err_frf_rails = -53,    ///< saturation thresholds in the wrong order
 
-    core_err_guard_travel = -60,    ///< lower travel limit not below the upper one, or not a number
-    core_err_guard_velocity = -61,  ///< speed limit not positive
-    core_err_guard_torque = -62,    ///< torque limit not positive
-    core_err_guard_stuck = -63,     ///< torque threshold of the stuck check not positive though it is on, or negative
-    core_err_guard_outside = -64,   ///< cannot be armed: the axis is outside its limits now, or its sensor is invalid
+    core_err_guard_travel = -60,   ///< lower travel limit not below the upper one, or not a number
+    core_err_guard_velocity = -61, ///< speed limit not positive
+    core_err_guard_torque = -62,   ///< torque limit not positive
+    core_err_guard_stuck = -63,    ///< torque threshold of the stuck check not positive though it is on, or negative
+    core_err_guard_outside = -64,  ///< cannot be armed: the axis is outside its limits now, or its sensor is invalid
 };
 
 /// One line for a person, without full stop; never NULL, also for numbers that are not in the list.

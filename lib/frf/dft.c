@@ -185,7 +185,8 @@ int64_t frf_period_real(const struct frf_dft *self, const struct frf_period *per
     return period->sums[frf_sum_offset(self, bin, channel)].sum;
 }
 
-int64_t frf_period_imaginary(const struct frf_dft *self, const struct frf_period *period, uint32_t bin, uint32_t channel)
+int64_t frf_period_imaginary(const struct frf_dft *self, const struct frf_period *period, uint32_t bin,
+                             uint32_t channel)
 {
     return period->sums[frf_sum_offset(self, bin, channel) + 1u].sum;
 }

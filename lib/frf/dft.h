@@ -3,20 +3,22 @@
 ///
 ///     Y_k = sum_{n=0}^{N-1} y[n] exp(-j 2 pi k n / N)
 ///
-/// The angle of every product is looked up exactly (index k n mod N), nothing is rotated or recursed: no drift, no loss at
-/// low bins, no dependence on how the samples are cut into chunks. The integer variants are exact sums of integers,
-/// bit-identical on every machine:
+/// The angle of every product is looked up exactly (index k n mod N), nothing is rotated or recursed: no drift, no
+/// loss at low bins, no dependence on how the samples are cut into chunks. The integer variants are exact sums of
+/// integers, bit-identical on every machine:
 ///
 ///     variant  samples, table, accumulator   arithmetic alone, worst bin, N = 2000 / 16384 / 65536
 ///     q15      i16, i16, i64                 >= 100 / 108 / 115 dB
 ///     q31      i16, i32, i64                 >= 190 / 200 / 205 dB
 ///     f32      float, float, float           >= 125 / 118 / 115 dB   (partial sums of SERVOSCOPE_FRF_BLOCK samples)
 ///
-/// (tests/unit/test_frf_dft.c prints and checks them.) Cost: 2 K C multiply-accumulates a sample for K bins and C channels;
-/// the channels share the table look-up. Feed blocks rather than single samples: a block keeps a bin's sums in registers.
+/// (tests/unit/test_frf_dft.c prints and checks them.) Cost: 2 K C multiply-accumulates a sample for K bins and C
+/// channels; the channels share the table look-up. Feed blocks rather than single samples: a block keeps a bin's sums
+/// in registers.
 ///
-/// One writer (the interrupt) feeds; at the end of a period the sums are latched by switching between two banks, without a
-/// copy; one reader has a whole period's time to read the last bank and asks afterwards whether it was in time. No locks.
+/// One writer (the interrupt) feeds; at the end of a period the sums are latched by switching between two banks,
+/// without a copy; one reader has a whole period's time to read the last bank and asks afterwards whether it was in
+/// time. No locks.
 #ifndef SERVOSCOPE_FRF_DFT_H
 #define SERVOSCOPE_FRF_DFT_H
 
@@ -29,28 +31,28 @@
 
 /// Why a period does not count; bits, several may hold. 0 is a valid period.
 enum frf_reason {
-    frf_reason_gap = 1,        ///< samples were lost
-    frf_reason_saturated = 2,  ///< a sample reached a rail of its converter
-    frf_reason_late = 4,       ///< the sample path was late: the samples are not equally spaced
-    frf_reason_application = 8,///< marked by the application: fading, aborting, tripped, settling
-    frf_reason_wrong_type = 16,///< float samples fed to an integer DFT, or the reverse
-    frf_reason_not_finite = 32,///< a float sample was infinite or NaN
+    frf_reason_gap = 1,         ///< samples were lost
+    frf_reason_saturated = 2,   ///< a sample reached a rail of its converter
+    frf_reason_late = 4,        ///< the sample path was late: the samples are not equally spaced
+    frf_reason_application = 8, ///< marked by the application: fading, aborting, tripped, settling
+    frf_reason_wrong_type = 16, ///< float samples fed to an integer DFT, or the reverse
+    frf_reason_not_finite = 32, ///< a float sample was infinite or NaN
     frf_reason_count = 6
 };
 
 /// One word of storage; which member is in use is the object's business.
 union frf_word {
-    int64_t sum;     ///< integer variants: one accumulator
-    float pair[2];   ///< f32: real and imaginary
+    int64_t sum;   ///< integer variants: one accumulator
+    float pair[2]; ///< f32: real and imaginary
     struct {
         uint16_t step, index; ///< k and k n mod N
     } bins[2];
 };
 CORE_STATIC_ASSERT(sizeof(union frf_word) == 8, storage_word_is_8_bytes);
 
-/// Words of storage for K bins and C channels: a step and an index per bin, and per bin and channel two banks of a real and
-/// an imaginary accumulator (of the float variant: two banks of a pair, and a pair of partial sums). Arguments are evaluated
-/// more than once.
+/// Words of storage for K bins and C channels: a step and an index per bin, and per bin and channel two banks of a
+/// real and an imaginary accumulator (of the float variant: two banks of a pair, and a pair of partial sums).
+/// Arguments are evaluated more than once.
 #define FRF_STORAGE_WORDS(bins, channels) (((bins) + 1u) / 2u + 4u * (bins) * (channels))
 CORE_STATIC_ASSERT(FRF_STORAGE_WORDS(1u, 1u) == 5u, storage_of_one_bin);
 CORE_STATIC_ASSERT(FRF_STORAGE_WORDS(64u, 3u) * 8u == 64u * 4u + 64u * 3u * 2u * 2u * 8u, storage_of_64_bins);
@@ -90,11 +92,11 @@ struct frf_dft {
     uint32_t reasons;            ///< of the period being filled
     uint32_t latched_reasons[2]; ///< by bank
     struct {
-        uint32_t lost;           ///< samples skipped over
-        uint32_t saturated;      ///< samples at a rail, each channel counted
-        uint32_t late;           ///< calls of frf_dft_mark() with frf_reason_late
-        uint32_t not_finite;     ///< float samples that were not numbers
-        uint32_t wrong_type;     ///< calls with the wrong kind of samples
+        uint32_t lost;       ///< samples skipped over
+        uint32_t saturated;  ///< samples at a rail, each channel counted
+        uint32_t late;       ///< calls of frf_dft_mark() with frf_reason_late
+        uint32_t not_finite; ///< float samples that were not numbers
+        uint32_t wrong_type; ///< calls with the wrong kind of samples
     } err;
 };
 
@@ -129,7 +131,8 @@ void frf_dft_mark(struct frf_dft *self, uint32_t reasons);
 /// Starts over at n = 0, dropping the period being filled; periods latched and counters stay.
 void frf_dft_restart(struct frf_dft *self);
 
-/// A latched period. Its sums stay true until the following period ends; frf_dft_is_intact() says whether they still are.
+/// A latched period. Its sums stay true until the following period ends; frf_dft_is_intact() says whether they still
+/// are.
 struct frf_period {
     const union frf_word *sums;
     uint32_t sequence; ///< 1 for the first period
@@ -144,6 +147,7 @@ bool frf_dft_is_intact(const struct frf_dft *self, const struct frf_period *peri
 
 /// Accumulators of an integer variant: sum of y[n] w(k n mod N), w the table's cosine and minus its sine, not scaled.
 int64_t frf_period_real(const struct frf_dft *self, const struct frf_period *period, uint32_t bin, uint32_t channel);
-int64_t frf_period_imaginary(const struct frf_dft *self, const struct frf_period *period, uint32_t bin, uint32_t channel);
+int64_t frf_period_imaginary(const struct frf_dft *self, const struct frf_period *period, uint32_t bin,
+                             uint32_t channel);
 
 #endif

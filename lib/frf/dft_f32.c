@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Float products are summed in partial sums of SERVOSCOPE_FRF_BLOCK samples, and these into the total: rounding then grows
- * with the block and with the number of blocks, not with the period. Blocks begin at multiples of their length within the
- * period wherever the caller cuts, so the cut does not change a bit of the result. */
+/* Float products are summed in partial sums of SERVOSCOPE_FRF_BLOCK samples, and these into the total: rounding then
+ * grows with the block and with the number of blocks, not with the period. Blocks begin at multiples of their length
+ * within the period wherever the caller cuts, so the cut does not change a bit of the result. */
 #include "core/bytes.h"
 #include "core/fixed.h"
 #include "frf/kernel.h"

@@ -2,7 +2,8 @@
 #include "frf/kernel.h"
 
 /* |sum| <= 2^15 * (2^15 - 1) * N: has to stay below 2^63. */
-CORE_STATIC_ASSERT((uint64_t)SERVOSCOPE_FRF_PERIOD_MAX <= ((uint64_t)1 << 62) >> (15 + 15), accumulator_cannot_overflow);
+CORE_STATIC_ASSERT((uint64_t)SERVOSCOPE_FRF_PERIOD_MAX <= ((uint64_t)1 << 62) >> (15 + 15),
+                   accumulator_cannot_overflow);
 
 /* One bin over one piece; returns the index after it. `channels` is a constant at every call but the last, so that the
  * sums stay in registers. The imaginary part is summed with the opposite sign because multiply-accumulate instructions
@@ -58,7 +59,7 @@ static void add(struct frf_dft *self, const void *frames, uint32_t count, bool f
 }
 
 enum core_status frf_dft_init_q15(struct frf_dft *self, const struct frf_dft_config *config,
-                                 const struct frf_twiddles_q15 *twiddles)
+                                  const struct frf_twiddles_q15 *twiddles)
 {
     if (!twiddles || !twiddles->sine || !twiddles->cosine) {
         return core_err_argument;

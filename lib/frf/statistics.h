@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: MIT */
-/// Frequency response with its standard deviation from the periods' Fourier coefficients, for one input U and one output Y:
+/// Frequency response with its standard deviation from the periods' Fourier coefficients, for one input U and one
+/// output Y:
 ///
 ///     G = mean(Y) / mean(U)
 ///     std^2 = |G|^2 / M ( s_yy / |Y|^2 + s_uu / |U|^2 - 2 Re( s_yu / (Y conj(U)) ) )
 ///     s_yu = 1/(M-1) sum (Y_m - Y) conj(U_m - U)
 ///
-/// over M periods, s_uu and s_yy likewise. std is the root: sqrt(E |dG|^2) of the complex error, both components together. For
-/// Gaussian scatter |dG|^2 / std^2 is F-distributed with (2, 2(M-1)) degrees of freedom: the 95 % circle has radius
-/// std sqrt(3.555) at M = 10. Evaluated as (s_yy + |G|^2 s_uu - 2 Re(conj(G) s_yu)) / (M |U|^2), which is the same and needs
-/// no Y other than zero.
+/// over M periods, s_uu and s_yy likewise. std is the root: sqrt(E |dG|^2) of the complex error, both components
+/// together. For Gaussian scatter |dG|^2 / std^2 is F-distributed with (2, 2(M-1)) degrees of freedom: the 95 % circle
+/// has radius std sqrt(3.555) at M = 10. Evaluated as (s_yy + |G|^2 s_uu - 2 Re(conj(G) s_yu)) / (M |U|^2), which is
+/// the same and needs no Y other than zero.
 ///
 /// Means and sums of squares are Welford's, so a large mean does not eat the scatter. Arithmetic: core_real, which
-/// SERVOSCOPE_REAL_BITS makes double or float; struct frf_statistics says which in `real_bits`. For the main loop, not for
-/// an interrupt. math.h is needed for the root and the magnitude check only.
+/// SERVOSCOPE_REAL_BITS makes double or float; struct frf_statistics says which in `real_bits`. For the main loop, not
+/// for an interrupt. math.h is needed for the root and the magnitude check only.
 #ifndef SERVOSCOPE_FRF_STATISTICS_H
 #define SERVOSCOPE_FRF_STATISTICS_H
 
@@ -40,10 +41,10 @@ struct frf_statistics {
     uint32_t real_bits;     ///< 64: double, 32: float
     struct {
         uint32_t by_reason[frf_reason_count]; ///< periods left out, by bit of enum frf_reason; several may hold
-        uint32_t invalid;    ///< periods left out for any of these reasons
-        uint32_t overrun;    ///< periods overwritten while they were read
-        uint32_t missed;     ///< periods that ended without having been read
-        uint32_t not_finite; ///< periods with a coefficient that is not a number
+        uint32_t invalid;                     ///< periods left out for any of these reasons
+        uint32_t overrun;                     ///< periods overwritten while they were read
+        uint32_t missed;                      ///< periods that ended without having been read
+        uint32_t not_finite;                  ///< periods with a coefficient that is not a number
     } excluded;
 };
 
@@ -55,10 +56,10 @@ enum frf_validity {
 };
 
 struct frf_estimate {
-    core_real real, imaginary;     ///< G; 0 unless there is an input, output units per input unit
-    core_real std;                 ///< of G; 0 unless valid
+    core_real real, imaginary;                 ///< G; 0 unless there is an input, output units per input unit
+    core_real std;                             ///< of G; 0 unless valid
     core_real input_variance, output_variance; ///< s_uu, s_yy: of one period, not of the mean
-    struct frf_complex covariance; ///< s_yu
+    struct frf_complex covariance;             ///< s_yu
     enum frf_validity validity;
 };
 
@@ -71,10 +72,10 @@ enum core_status frf_statistics_init(struct frf_statistics *self, struct frf_pai
 /// A period with a coefficient that is not finite is left out and counted. Returns whether it was added.
 bool frf_statistics_add(struct frf_statistics *self, const struct frf_complex *input, const struct frf_complex *output);
 
-/// Adds the last completed period of a DFT, once: channels input_channel and output_channel, in sample counts (times N).
-/// Left out and counted: invalid periods, by reason; periods overwritten during the call. Call it at least once per period;
-/// periods that passed unseen are counted in excluded.missed. Returns whether a period was added.
-/// The DFT must have bin_count bins, else nothing is added.
+/// Adds the last completed period of a DFT, once: channels input_channel and output_channel, in sample counts (times
+/// N). Left out and counted: invalid periods, by reason; periods overwritten during the call. Call it at least once
+/// per period; periods that passed unseen are counted in excluded.missed. Returns whether a period was added. The DFT
+/// must have bin_count bins, else nothing is added.
 bool frf_statistics_add_period(struct frf_statistics *self, const struct frf_dft *dft, uint32_t input_channel,
                                uint32_t output_channel);
 

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/// Tables of sine and cosine over one period, from which the DFT takes every factor exactly: angle 2 pi k n / N is entry
-/// k n mod N. A table is const data (in flash, made on the host) or is built at start-up by frf_twiddles_build_*().
+/// Tables of sine and cosine over one period, from which the DFT takes every factor exactly: angle 2 pi k n / N is
+/// entry k n mod N. A table is const data (in flash, made on the host) or is built at start-up by
+/// frf_twiddles_build_*().
 ///
-/// Where 4 divides N the cosine is the sine a quarter of a period on, and a quarter more sine is stored so that it is read
-/// without a wrap; elsewhere the cosine has its own table.
+/// Where 4 divides N the cosine is the sine a quarter of a period on, and a quarter more sine is stored so that it is
+/// read without a wrap; elsewhere the cosine has its own table.
 #ifndef SERVOSCOPE_FRF_TWIDDLE_H
 #define SERVOSCOPE_FRF_TWIDDLE_H
 
@@ -34,7 +35,8 @@ struct frf_twiddles_f32 {
     uint32_t period_samples;
 };
 
-/// Builds a table in storage of FRF_TWIDDLE_WORDS(period_samples) words. Uses math.h (sin, double); not for an interrupt.
+/// Builds a table in storage of FRF_TWIDDLE_WORDS(period_samples) words. Uses math.h (sin, double); not for an
+/// interrupt.
 /// Range:    4 <= period_samples <= SERVOSCOPE_FRF_PERIOD_MAX
 /// Accuracy: every entry correctly rounded from sin() in double of an angle reduced exactly to one octant, so that
 ///           sin(pi - x) = sin x, sin(-x) = -sin x and cos x = sin(pi/2 - x) hold exactly

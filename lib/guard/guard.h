@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /// Limits around an excitation, in the sample path: travel, speed, torque, the host's sign of life, the sensor.
 ///
-/// A trip asks the player for a ramp to zero (never a step), is latched with its cause and the value that caused it, and
-/// holds until guard_arm(). The torque clip is a limit, not a trip: it clips and counts.
+/// A trip asks the player for a ramp to zero (never a step), is latched with its cause and the value that caused it,
+/// and holds until guard_arm(). The torque clip is a limit, not a trip: it clips and counts.
 ///
 ///     state     event                                      next      guard_step() says
 ///     idle      step, whatever is measured                 idle      ramp_down
@@ -14,10 +14,10 @@
 ///     tripped   step, whatever is measured                 tripped   ramp_down
 ///     tripped   arm inside / outside                       armed / tripped, cause kept
 ///
-/// Quantities are counts of the drive, so that the path stays integer; guard/guard_real.h is the same in SI units, where NaN
-/// fails every check. All limits are inclusive: a value equal to its limit is inside.
-/// One writer: step and arm from the sample path, or arm while the sample path does not run. guard_alive() may be called
-/// from anywhere else.
+/// Quantities are counts of the drive, so that the path stays integer; guard/guard_real.h is the same in SI units,
+/// where NaN fails every check. All limits are inclusive: a value equal to its limit is inside. One writer: step and
+/// arm from the sample path, or arm while the sample path does not run. guard_alive() may be called from anywhere
+/// else.
 #ifndef SERVOSCOPE_GUARD_GUARD_H
 #define SERVOSCOPE_GUARD_GUARD_H
 
@@ -29,7 +29,7 @@
 
 enum guard_cause {
     guard_cause_none = 0,
-    guard_cause_sensor = 1,   ///< the sample said it is invalid, or (SI variant) a value is not a number
+    guard_cause_sensor = 1, ///< the sample said it is invalid, or (SI variant) a value is not a number
     guard_cause_travel = 2,
     guard_cause_speed = 3,
     guard_cause_watchdog = 4, ///< no sign of life for more than watchdog_samples
@@ -43,18 +43,21 @@ enum guard_action {
 
 enum guard_mode { guard_idle = 0, guard_armed = 1, guard_tripped = 2 };
 
-/// Limits in counts. A limit that is not wanted: INT32_MIN and INT32_MAX for travel, INT32_MAX for speed and torque, 0 for
-/// the two durations; GUARD_LIMITS_NONE has them all.
+/// Limits in counts. A limit that is not wanted: INT32_MIN and INT32_MAX for travel, INT32_MAX for speed and torque, 0
+/// for the two durations; GUARD_LIMITS_NONE has them all.
 struct guard_limits {
     int32_t position_min, position_max; ///< position_min < position_max
     int32_t velocity_max;               ///< |velocity| <= velocity_max, > 0
     int32_t torque_max;                 ///< what guard_clip_torque() clips to, > 0
     uint32_t watchdog_samples;          ///< trips at this many samples + 1 without a sign of life; 0: never
     uint32_t stuck_samples;             ///< trips at this many samples in a row; 0: never
-    int32_t stuck_torque;               ///< |torque| at or above which the axis has to move; >= 0, > 0 if stuck_samples is
+    int32_t stuck_torque; ///< |torque| at or above which the axis has to move; >= 0, > 0 if stuck_samples is
 };
 
-#define GUARD_LIMITS_NONE {INT32_MIN, INT32_MAX, INT32_MAX, INT32_MAX, 0, 0, 0}
+#define GUARD_LIMITS_NONE                                                                                              \
+    {                                                                                                                  \
+        INT32_MIN, INT32_MAX, INT32_MAX, INT32_MAX, 0, 0, 0                                                            \
+    }
 
 struct guard_sample {
     int32_t position, velocity, torque;
@@ -64,15 +67,15 @@ struct guard_sample {
 /// What both variants share; read-only for the application.
 struct guard_state {
     enum guard_mode mode;
-    enum guard_cause cause;         ///< why it tripped last; kept until armed again
+    enum guard_cause cause; ///< why it tripped last; kept until armed again
     uint32_t watchdog_samples, stuck_samples;
-    uint32_t silent_samples;        ///< since the last sign of life was seen
-    uint32_t still_samples;         ///< in a row, unmoved under torque
-    volatile uint32_t signs_of_life;///< written by guard_alive() only
+    uint32_t silent_samples;         ///< since the last sign of life was seen
+    uint32_t still_samples;          ///< in a row, unmoved under torque
+    volatile uint32_t signs_of_life; ///< written by guard_alive() only
     uint32_t signs_seen;
     struct {
         uint32_t trips;
-        uint32_t torque_clipped;    ///< samples, a limit and not a fault
+        uint32_t torque_clipped; ///< samples, a limit and not a fault
     } count;
 };
 

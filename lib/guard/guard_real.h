@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// The guard of guard/guard.h in SI units, for hosts and for parts with an FPU: the same states, causes and order. NaN and
-/// infinity fail every check; a torque command that is not a number is clipped to 0.
+/// The guard of guard/guard.h in SI units, for hosts and for parts with an FPU: the same states, causes and order. NaN
+/// and infinity fail every check; a torque command that is not a number is clipped to 0.
 #ifndef SERVOSCOPE_GUARD_GUARD_REAL_H
 #define SERVOSCOPE_GUARD_GUARD_REAL_H
 
@@ -15,10 +15,13 @@ struct guard_real_limits {
     core_real torque_max_Nm;                      ///< > 0
     uint32_t watchdog_samples;                    ///< as in struct guard_limits
     uint32_t stuck_samples;
-    core_real stuck_torque_Nm;                    ///< > 0 if stuck_samples is
+    core_real stuck_torque_Nm; ///< > 0 if stuck_samples is
 };
 
-#define GUARD_REAL_LIMITS_NONE {-CORE_REAL_MAX, CORE_REAL_MAX, CORE_REAL_MAX, CORE_REAL_MAX, 0, 0, 0}
+#define GUARD_REAL_LIMITS_NONE                                                                                         \
+    {                                                                                                                  \
+        -CORE_REAL_MAX, CORE_REAL_MAX, CORE_REAL_MAX, CORE_REAL_MAX, 0, 0, 0                                           \
+    }
 
 struct guard_real_sample {
     core_real position_rad, velocity_rad_per_s, torque_Nm;

@@ -28,12 +28,8 @@ static uint64_t advance_ramp(struct msgen_player *self)
     return self->ramp_q62;
 }
 
-enum core_status msgen_player_set_up(struct msgen_player *self, const struct msgen_table *table,
-                                     const struct msgen_player_config *config)
+static enum core_status check_config(const struct msgen_player_config *config)
 {
-    if (!self || !table || !config || table->period_samples == 0) {
-        return core_err_argument;
-    }
     if (config->fade_in_samples > msgen_ramp_samples_max || config->fade_out_samples > msgen_ramp_samples_max ||
         config->abort_samples > msgen_ramp_samples_max || config->abort_samples == 0) {
         return core_err_player_fade;
@@ -45,6 +41,19 @@ enum core_status msgen_player_set_up(struct msgen_player *self, const struct msg
         if (config->limit[c] < 0) {
             return core_err_player_limit;
         }
+    }
+    return core_ok;
+}
+
+enum core_status msgen_player_set_up(struct msgen_player *self, const struct msgen_table *table,
+                                     const struct msgen_player_config *config)
+{
+    if (!self || !table || !config || table->period_samples == 0) {
+        return core_err_argument;
+    }
+    enum core_status status = check_config(config);
+    if (status != core_ok) {
+        return status;
     }
     self->table = table;
     self->config = *config;

@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: MIT */
 /// Plays a table: fade in, whole periods from the start index, fade out; ramps to zero when aborted.
 ///
-/// Every sample is w x[n]: w the fade factor, the same for all channels, x the table. w runs along s(t) = 3 t^2 - 2 t^3
-/// (within 1 % of a raised cosine, slope zero at both ends, integer arithmetic only), so that at any time, abort included,
+/// Every sample is w x[n]: w the fade factor, the same for all channels, x the table. w runs along s(t) = 3 t^2 - 2
+/// t^3 (within 1 % of a raised cosine, slope zero at both ends, integer arithmetic only), so that at any time, abort
+/// included,
 ///
 ///     |out[n] - out[n-1]| <= max |x[n] - x[n-1]| + 1.5 max |x| / (length of the ramp) + 1 count
 ///
-/// A ramp of no length is allowed for the two fades (the table's start index is chosen so that little moves there), never
-/// for the abort.
+/// A ramp of no length is allowed for the two fades (the table's start index is chosen so that little moves there),
+/// never for the abort.
 ///
-/// Trap: while w changes, a cascade's references do not belong together exactly: the derivative of w x is w x' + w' x, but
-/// the velocity and torque feed-forward played are w x' and w x''. The error is w' x, at most 1.5 max |x| / (ramp length in
-/// seconds), it is there during the ramps only, and the drive's position loop absorbs it. During whole periods w = 1 and
-/// the references are exactly the table's.
+/// Trap: while w changes, a cascade's references do not belong together exactly: the derivative of w x is w x' + w' x,
+/// but the velocity and torque feed-forward played are w x' and w x''. The error is w' x, at most 1.5 max |x| / (ramp
+/// length in seconds), it is there during the ramps only, and the drive's position loop absorbs it. During whole
+/// periods w = 1 and the references are exactly the table's.
 #ifndef SERVOSCOPE_MSGEN_PLAYER_H
 #define SERVOSCOPE_MSGEN_PLAYER_H
 
@@ -34,8 +35,9 @@ struct msgen_player_config {
     uint32_t fade_in_samples;  ///< 0: starts at the start index with full amplitude
     uint32_t fade_out_samples; ///< 0: stops after the last sample of the last period
     uint32_t abort_samples;    ///< at least 1
-    int32_t gain_q16[msgen_channels_max]; ///< output units per count in Q16, negative turns the direction; 0: msgen_gain_one
-    int32_t limit[msgen_channels_max];    ///< largest |output|; 0: INT32_MAX
+    int32_t gain_q16
+        [msgen_channels_max]; ///< output units per count in Q16, negative turns the direction; 0: msgen_gain_one
+    int32_t limit[msgen_channels_max]; ///< largest |output|; 0: INT32_MAX
 };
 
 /// Which sample a call has put out.
@@ -57,7 +59,7 @@ struct msgen_player {
     int32_t factor_q30;          ///< w of the last sample
     int32_t abort_from_q30;      ///< w when the abort began
     struct {
-        uint32_t saturated;      ///< outputs that were clipped to their limit, per channel and sample
+        uint32_t saturated; ///< outputs that were clipped to their limit, per channel and sample
     } err;
 };
 

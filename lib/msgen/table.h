@@ -49,19 +49,19 @@ enum msgen_format {
 
 /// A checked view of a table; read-only for the application. The bytes must outlive it and not change.
 struct msgen_table {
-    const uint8_t *bins;     ///< 4 * bin_count bytes; read with msgen_table_bin()
-    const uint8_t *samples;  ///< period_samples frames; read with msgen_table_count() or msgen_table_float_bits()
+    const uint8_t *bins;    ///< 4 * bin_count bytes; read with msgen_table_bin()
+    const uint8_t *samples; ///< period_samples frames; read with msgen_table_count() or msgen_table_float_bits()
     uint32_t rate_num_hz, rate_den;
-    uint32_t period_samples; ///< N
-    uint32_t bin_count;      ///< K
-    uint32_t start_index;    ///< sample at which the first counted period begins
+    uint32_t period_samples;                 ///< N
+    uint32_t bin_count;                      ///< K
+    uint32_t start_index;                    ///< sample at which the first counted period begins
     uint32_t scale_bits[msgen_channels_max]; ///< float bits, SI per count
     uint32_t data_crc32;
-    uint32_t header_crc32;   ///< names the table: `table_crc32` of every file
+    uint32_t header_crc32; ///< names the table: `table_crc32` of every file
     uint32_t channels;
     enum msgen_format format;
-    bool linear;             ///< N, m/s, m instead of Nm, rad/s, rad
-    uint32_t fault_offset;   ///< after a refusal: offset of the first byte of what was refused
+    bool linear;           ///< N, m/s, m instead of Nm, rad/s, rad
+    uint32_t fault_offset; ///< after a refusal: offset of the first byte of what was refused
 };
 
 /// Checks a whole table and opens it for reading, without copying.

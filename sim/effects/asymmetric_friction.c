@@ -41,6 +41,6 @@ const struct sim_effect sim_effect_asymmetric_friction = {
                     .model_offset = SIZE_MAX}},
     .oppose = asymmetric_oppose,
     .scan = asymmetric_scan,
-    .minimum_change = 0.0,
+    .measure = "at constant speeds both ways, and at half the level",
     .say = asymmetric_say,
 };

@@ -74,6 +74,6 @@ const struct sim_effect sim_effect_belt_elasticity = {
                     .model_offset = offsetof(struct sim_model, belt_damping_Nms_per_rad)}},
     .engage = elasticity_engage,
     .scan = elasticity_scan,
-    .minimum_change = 0.10,
+    .measure = "with lines up to twice the suspected resonance",
     .say = elasticity_say,
 };

@@ -43,6 +43,17 @@ static bool cogging_testable(const double *p, const struct sim_coverage *coverag
     return false;
 }
 
+/// A motor's ripple usually repeats at least twelve times a turn; on a linear axis the pitch is not known beforehand.
+static bool cogging_blind(const struct sim_coverage *coverage, char *out_why, size_t size)
+{
+    const double fewest = 1.5, usual = 12.0;
+    if (coverage->linear || coverage->position_span > turn * fewest / usual)
+        return false;
+    snprintf(out_why, size, "%.3f of a turn was covered: ripple that repeats fewer than %.0f times a turn cannot show",
+             coverage->position_span / turn, ceil(turn * fewest / coverage->position_span));
+    return true;
+}
+
 static void cogging_say(const struct sim_finding *f, char *out_text, size_t size)
 {
     if (f->linear)
@@ -84,6 +95,7 @@ const struct sim_effect sim_effect_cogging = {
     .oppose = cogging_oppose,
     .scan = cogging_scan,
     .testable = cogging_testable,
-    .minimum_change = 0.0,
+    .blind = cogging_blind,
+    .measure = "one slow turn at constant speed, or a slow stroke under the excitation",
     .say = cogging_say,
 };

@@ -37,6 +37,6 @@ const struct sim_effect sim_effect_coulomb_friction = {
                     .linear_maximum = 1e9,
                     .model_offset = offsetof(struct sim_model, coulomb_friction_Nm)}},
     .scan = coulomb_scan,
-    .minimum_change = 0.12,
+    .measure = "at constant speeds, several of them both ways",
     .say = coulomb_say,
 };

@@ -34,6 +34,6 @@ const struct sim_effect sim_effect_dead_time = {
                     .linear_maximum = 0.05,
                     .model_offset = offsetof(struct sim_model, dead_time_s)}},
     .scan = delay_scan,
-    .minimum_change = 0.12,
+    .measure = "with lines up to a quarter of the sampling rate",
     .say = delay_say,
 };

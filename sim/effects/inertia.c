@@ -38,6 +38,6 @@ const struct sim_effect sim_effect_inertia = {
                     .linear_maximum = 1e7,
                     .model_offset = offsetof(struct sim_model, load_inertia_kgm2)}},
     .scan = inertia_scan,
-    .minimum_change = 0.05,
+    .measure = "at a higher level of high-frequency torque, where friction matters less",
     .say = inertia_say,
 };

@@ -39,6 +39,6 @@ const struct sim_effect sim_effect_load_bias = {
                     .model_offset = SIZE_MAX}},
     .oppose = bias_oppose,
     .scan = bias_scan,
-    .minimum_change = 0.0,
+    .measure = "the torque that holds the axis still when approached from both sides, and at half the level",
     .say = bias_say,
 };

@@ -63,6 +63,6 @@ const struct sim_effect sim_effect_stribeck_friction = {
     .oppose = stribeck_oppose,
     .scan = stribeck_scan,
     .testable = stribeck_testable,
-    .minimum_change = 0.0,
+    .measure = "at slow constant speeds down to creeping",
     .say = stribeck_say,
 };

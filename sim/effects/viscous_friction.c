@@ -38,6 +38,6 @@ const struct sim_effect sim_effect_viscous_friction = {
                     .linear_maximum = 1e9,
                     .model_offset = offsetof(struct sim_model, viscous_friction_Nms_per_rad)}},
     .scan = viscous_scan,
-    .minimum_change = 0.12,
+    .measure = "at constant speeds, several of them both ways",
     .say = viscous_say,
 };

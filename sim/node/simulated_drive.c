@@ -111,12 +111,26 @@ static uint32_t write_period(void *owner, const struct od_entry *entry, int64_t 
 }
 
 #define AT(member) offsetof(struct simulated_drive, member)
-#define CONSTANT(index, sub, type, value) {index, sub, type, od_readable | od_constant, 0, value, NULL}
-#define READ_ONLY(index, sub, type, member) {index, sub, type, od_readable, AT(member), 0, NULL}
-#define WRITABLE(index, sub, type, member, write) {index, sub, type, od_readable | od_writable, AT(objects.member), 0, write}
-#define TARGET(index, type, member, write) \
-    {index, 0, type, od_readable | od_writable | od_mappable_receive, AT(objects.member), 0, write}
-#define ACTUAL(index, type, member) {index, 0, type, od_readable | od_mappable_transmit, AT(objects.member), 0, NULL}
+#define CONSTANT(index, sub, type, value)                                                                              \
+    {                                                                                                                  \
+        index, sub, type, od_readable | od_constant, 0, value, NULL                                                    \
+    }
+#define READ_ONLY(index, sub, type, member)                                                                            \
+    {                                                                                                                  \
+        index, sub, type, od_readable, AT(member), 0, NULL                                                             \
+    }
+#define WRITABLE(index, sub, type, member, write)                                                                      \
+    {                                                                                                                  \
+        index, sub, type, od_readable | od_writable, AT(objects.member), 0, write                                      \
+    }
+#define TARGET(index, type, member, write)                                                                             \
+    {                                                                                                                  \
+        index, 0, type, od_readable | od_writable | od_mappable_receive, AT(objects.member), 0, write                  \
+    }
+#define ACTUAL(index, type, member)                                                                                    \
+    {                                                                                                                  \
+        index, 0, type, od_readable | od_mappable_transmit, AT(objects.member), 0, NULL                                \
+    }
 
 static const struct od_entry profile_entries[] = {
     CONSTANT(0x2000, 0, od_u8, 5),
@@ -160,10 +174,12 @@ static const struct od_entry profile_entries[] = {
 
 // ---- Stops and limits
 
-/// A stop is over when its ramp has reached zero and the motor follows, or a tenth of a second after the ramp at the latest.
+/// A stop is over when its ramp has reached zero and the motor follows, or a tenth of a second after the ramp at the
+/// latest.
 static void finish_stop(struct simulated_drive *self)
 {
-    bool stopping = self->machine.state == cia402_quick_stop_active || self->machine.state == cia402_fault_reaction_active;
+    bool stopping =
+        self->machine.state == cia402_quick_stop_active || self->machine.state == cia402_fault_reaction_active;
     if (!stopping || self->drive.stop_velocity != 0.0)
         return;
     self->stopping_samples++;
@@ -254,7 +270,8 @@ static void publish(struct simulated_drive *self, bool targets_fresh)
     watch_following_error(self);
     finish_stop(self);
     bool clipped = self->limited || fabs(self->sample.torque_ref) >= self->drive.torque_limit;
-    o->status_word = (uint16_t)(cia402_status_encode(self->machine.state) | cia402_status_remote | cia402_status_voltage);
+    o->status_word =
+        (uint16_t)(cia402_status_encode(self->machine.state) | cia402_status_remote | cia402_status_voltage);
     if (clipped && self->command.control != sim_control_off)
         o->status_word |= cia402_status_limited;
     bool follows = self->command.control == sim_control_cascade || self->command.control == sim_control_torque;
@@ -270,7 +287,7 @@ static void take_sample(struct simulated_drive *self, bool targets_fresh)
     sim_belt_drive_step(&self->drive, &self->command, &self->sample);
     self->samples++;
     publish(self, targets_fresh);
-    if (!cia402_machine_is_powered(&self->machine))
+    if (self->command.control == sim_control_off) // the torque is off since this sample: nothing left to do alone
         self->own_cycle = false;
 }
 
@@ -314,7 +331,8 @@ static void power_on(struct simulated_drive *self)
     self->drive.torque_limit = o->max_torque * self->scaling.torque;
     self->drive.stop_deceleration = o->quick_stop_deceleration * 1e-3;
     self->own_cycle = false;
-    o->status_word = (uint16_t)(cia402_status_encode(self->machine.state) | cia402_status_remote | cia402_status_voltage);
+    o->status_word =
+        (uint16_t)(cia402_status_encode(self->machine.state) | cia402_status_remote | cia402_status_voltage);
 }
 
 static void on_reset(void *owner)
@@ -364,7 +382,7 @@ static uint32_t round_up_125(double value)
     double decade = 1.0;
     while (decade * 10.0 <= value && decade < 1e8)
         decade *= 10.0;
-    double steps[] = {1.0, 2.0, 5.0};
+    const double steps[] = {1.0, 2.0, 5.0};
     for (int i = 0; i < 3; i++)
         if (value <= steps[i] * decade)
             return (uint32_t)(steps[i] * decade);
@@ -407,8 +425,8 @@ void simulated_drive_init(struct simulated_drive *self, const struct sim_model *
     choose_units(self);
     self->objects.supported_modes = CIA402_SUPPORTS(cia402_mode_csp) | CIA402_SUPPORTS(cia402_mode_cst);
     // A rate that 60C2 cannot say leaves the period at 0 x 1 s: the drive runs once a master has set one.
-    self->period_valid = cia402_period_encode(1.0 / model->sample_rate_hz, &self->objects.period_units,
-                                              &self->objects.period_exponent);
+    self->period_valid =
+        cia402_period_encode(1.0 / model->sample_rate_hz, &self->objects.period_units, &self->objects.period_exponent);
     sim_belt_drive_init(&self->drive, &self->model, 0.0);
     power_on(self);
 }

@@ -8,13 +8,9 @@
 
 #include <string.h>
 
-void setUp(void)
-{
-}
+void setUp(void) {}
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 /* The polynomial's definition, bit by bit: shares nothing with the table of the implementation. */
 static uint32_t crc_by_definition(const uint8_t *bytes, size_t size)

@@ -26,6 +26,7 @@ struct fake_drive {
     size_t lost_count;
     size_t interrupt_at; ///< exchange during which the user presses Ctrl-C
     size_t nan_at;
+    size_t nan_reference_at;
     enum drive_status open_status, arm_status, stop_status;
     bool stopped;
     size_t setpoints_after_failure;
@@ -78,6 +79,9 @@ static enum drive_status fake_exchange(void *self, const struct drive_setpoint *
                                         setpoint->velocity_rad_per_s, true};
     if (number == fake.nan_at) {
         out_sample->velocity_rad_per_s = NAN;
+    }
+    if (number == fake.nan_reference_at) {
+        out_sample->torque_ref_Nm = NAN;
     }
     return drive_ok;
 }
@@ -348,6 +352,11 @@ static void test_measure_stops_on_a_number_that_is_none_and_keeps_the_rest(void)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(report.stopped_by, "not a number"), report.stopped_by);
     TEST_ASSERT_EQUAL_size_t(100 - 2 - fade, run.rows);
     check_ends_at_zero();
+    check_file_is_whole(run.rows);
+    setUp();
+    fake.nan_reference_at = 70;
+    TEST_ASSERT_EQUAL_INT(error_refused, measure(&plan));
+    TEST_ASSERT_EQUAL_size_t(70 - 2 - fade, run.rows);
     check_file_is_whole(run.rows);
 }
 

@@ -101,9 +101,7 @@ void setUp(void)
     build(msgen_format_i16, 17);
 }
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 static void check_whole_run(void)
 {
@@ -118,6 +116,8 @@ static void check_whole_run(void)
         for (unsigned c = 0; c < channels; c++)
             TEST_ASSERT_DOUBLE_WITHIN(tolerance_of(c), expected_factor(s) * values[index][c], out[c]);
         TEST_ASSERT_EQUAL_HEX32(0x5A5A5A5A, (uint32_t)out[channels]);
+        if (s == 0 || s >= end - 1) /* the ramps end at zero exactly */
+            TEST_ASSERT_EACH_EQUAL_INT32(0, out, channels);
         if (s < fade_in)
             TEST_ASSERT_EQUAL_INT(msgen_phase_fade_in, state.phase);
         else if (s < fade_in + periods * samples) {

@@ -84,11 +84,31 @@ static void test_period_search_finds_excited_bins_only(void)
     double complex *spectra = malloc(periods * all * sizeof *spectra);
     uint32_t bins[all];
     TEST_ASSERT_TRUE(spectra_transform_all(signal, length, periods, spectra));
-    size_t count = period_search_bins(spectra, periods, all, all, bins);
+    size_t count;
+    TEST_ASSERT_TRUE(period_search_bins(spectra, periods, all, all, bins, &count));
     TEST_ASSERT_EQUAL_size_t(15, count);
     for (uint32_t b = 0; b < count; b++) {
         TEST_ASSERT_EQUAL_UINT32(3 + 4 * b, bins[b]);
     }
+    free(signal);
+    free(spectra);
+}
+
+/// In a loop the lines between the excited ones repeat as well, and are far above the noise.
+static void test_period_search_tells_distortion_from_excitation(void)
+{
+    enum { length = 500, periods = 8, all = length / 2 + 1 };
+    double *signal = multisine(length * periods, length, 0.001, 6);
+    double complex *spectra = malloc(periods * all * sizeof *spectra);
+    uint32_t bins[all];
+    size_t count;
+    for (size_t n = 0; n < length * periods; n++) {
+        signal[n] += 0.004 * signal[n] * signal[n] + 0.1 * cos(two_pi * 5.0 * (double)n / length);
+    }
+    TEST_ASSERT_TRUE(spectra_transform_all(signal, length, periods, spectra));
+    TEST_ASSERT_TRUE(period_search_bins(spectra, periods, all, all, bins, &count));
+    TEST_ASSERT_EQUAL_size_t(15, count);
+    TEST_ASSERT_EQUAL_UINT32(7, bins[1]);
     free(signal);
     free(spectra);
 }
@@ -100,5 +120,6 @@ int main(void)
     RUN_TEST(test_period_search_refuses_fraction_with_figure);
     RUN_TEST(test_period_search_refuses_noise_and_short_signals);
     RUN_TEST(test_period_search_finds_excited_bins_only);
+    RUN_TEST(test_period_search_tells_distortion_from_excitation);
     return UNITY_END();
 }

@@ -66,6 +66,30 @@ static void test_settle_leaves_nothing_out_without_a_transient(void)
     TEST_ASSERT_TRUE(left_out <= 6);
 }
 
+static void test_settle_stops_at_half_of_a_recording_that_never_settles(void)
+{
+    enum { periods = 10, bins = 50 };
+    static double complex spectra[periods * bins];
+    bool usable[periods];
+    double level[periods];
+    struct settle settle;
+    for (size_t p = 0; p < periods; p++) {
+        usable[p] = true;
+    }
+    /* 1000 times the scatter, falling so slowly that the later half still moves by its hundredfold. */
+    make_periods(spectra, periods, bins, 1000.0, 0.9, 2);
+    TEST_ASSERT_TRUE(settle_measure(spectra, periods, bins, usable, &settle, level));
+    TEST_ASSERT_EQUAL_size_t(periods / 2, settle.periods);
+    TEST_ASSERT_FALSE(settle.settled);
+    /* A jump after the later half has begun: the period before it is unlike the rest, but no start transient. */
+    make_periods(spectra, periods, bins, 0.0, 1.0, 3);
+    for (size_t i = 0; i < 6 * bins; i++) {
+        spectra[i] += 1000.0;
+    }
+    TEST_ASSERT_TRUE(settle_measure(spectra, periods, bins, usable, &settle, level));
+    TEST_ASSERT_TRUE(settle.periods <= periods / 2);
+}
+
 static void test_settle_says_when_it_cannot_tell(void)
 {
     enum { periods = 3, bins = 4 };
@@ -84,6 +108,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_settle_counts_periods_of_a_decaying_transient);
     RUN_TEST(test_settle_leaves_nothing_out_without_a_transient);
+    RUN_TEST(test_settle_stops_at_half_of_a_recording_that_never_settles);
     RUN_TEST(test_settle_says_when_it_cannot_tell);
     return UNITY_END();
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /// servoscope design: from the limits of an axis to the table that a drive plays.
 #include "tools/servoscope/command.h"
+#include "tools/servoscope/designing.h"
 #include "tools/servoscope/options.h"
 
 #include "lab/design/design.h"
@@ -23,6 +24,7 @@ struct arguments {
     long long period_samples;
     const char *lines;
     const char *out;
+    const char *report;
     const char *method;
     const char *keep;
     const char *grid;
@@ -52,6 +54,7 @@ static int read_options(int argc, char **argv, struct arguments *out, struct err
          .highest = design_period_samples_max},
         {.name = "lines", .kind = option_text, .target = &out->lines, .required = true},
         {.name = "out", .kind = option_text, .target = &out->out, .required = true},
+        {.name = "report", .kind = option_text, .target = &out->report},
         {.name = "method", .kind = option_text, .target = &out->method},
         {.name = "keep", .kind = option_text, .target = &out->keep},
         {.name = "grid", .kind = option_text, .target = &out->grid},
@@ -204,49 +207,6 @@ static int read_choices(const struct arguments *arguments, struct design_request
     return 0;
 }
 
-/// One period as it was designed, and where in it to begin: the player starts at start_index.
-static int fill_table(const struct design_request *request, const struct design_result *result, struct table *out_table,
-                      struct error *out_error)
-{
-    const uint32_t samples = (uint32_t)result->period_samples;
-    int status = table_alloc(out_table, samples, msgen_channels_max, (uint32_t)result->bin_count, out_error);
-    if (status) {
-        return status;
-    }
-    out_table->rate_num_hz = request->rate_numerator_hz;
-    out_table->rate_den = request->rate_denominator;
-    out_table->start_index = (uint32_t)result->start_index;
-    out_table->linear = request->linear;
-    memcpy(out_table->bins, result->bins, result->bin_count * sizeof *result->bins);
-    memcpy(out_table->torque, result->torque_Nm, samples * sizeof(double));
-    memcpy(out_table->velocity, result->velocity_rad_per_s, samples * sizeof(double));
-    memcpy(out_table->position, result->position_rad, samples * sizeof(double));
-    memcpy(out_table->acceleration, result->acceleration_rad_per_s2, samples * sizeof(double));
-    return 0;
-}
-
-static int write_files(const char *prefix, const struct design_request *request, const struct design_result *result,
-                       struct error *out_error)
-{
-    // The table comes last: where it is, the others are.
-    static const struct {
-        const char *ending;
-        int (*write)(const char *path, struct table *table, struct error *out_error);
-    } files[] = {{".csv", table_file_write_csv}, {".h", table_file_write_header}, {".mst", table_file_write_mst}};
-    struct table table = {0};
-    const size_t path_size = strlen(prefix) + 5;
-    char *path = malloc(path_size);
-    int status = path ? fill_table(request, result, &table, out_error)
-                      : error_set(out_error, error_refused, "memory is short for the file names");
-    for (size_t i = 0; !status && i < sizeof files / sizeof files[0]; i++) {
-        snprintf(path, path_size, "%s%s", prefix, files[i].ending);
-        status = files[i].write(path, &table, out_error);
-    }
-    table_free(&table);
-    free(path);
-    return status;
-}
-
 static cJSON *json_of_peaks(const struct design_peaks *peaks, bool linear)
 {
     cJSON *object = cJSON_CreateObject();
@@ -353,7 +313,10 @@ static int design_and_write(const struct arguments *arguments, struct design_req
     request->bin_count = lines.count;
     status = design_run(request, &result, out_error);
     if (!status) {
-        status = write_files(arguments->out, request, &result, out_error);
+        status = designing_write(arguments->out, request, &result, out_error);
+        if (!status && arguments->report) {
+            status = designing_report(arguments->report, request, &result, out_error);
+        }
         status = status ? status : report(arguments, request, &result, context, out_error);
         design_result_free(&result);
     }
@@ -412,6 +375,7 @@ const struct command command_cmd_design = {
         "  --start paper        begin at the zero crossing of velocity with the least acceleration (default)\n"
         "  --start none         begin at sample 0\n"
         "  --seed S             default 1\n"
+        "  --report FILE.html   a page: the period against its limits, the spectrum, the figures\n"
         "\n"
         "example, the belt drive of the first paper:\n"
         "  servoscope design --rate 1000 --period 2000 --lines linear:0.5:100:0.5 --limit-torque 1 --inertia 0.00516 "

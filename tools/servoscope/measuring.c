@@ -194,11 +194,24 @@ static const char *end_name(enum measure_end end)
     return "drive";
 }
 
-static int print_json(const char *path, const struct run *run, const struct measure_report *report, double rate_per_s,
-                      struct error *out_error)
+static void add_bus(const struct door *door, cJSON *object)
+{
+    struct door_statistics bus;
+    door_read_statistics(door, &bus);
+    cJSON *added = cJSON_AddObjectToObject(object, "bus");
+    cJSON_AddNumberToObject(added, "bitrate", bus.bitrate);
+    cJSON_AddNumberToObject(added, "load", bus.bus_load);
+    cJSON_AddNumberToObject(added, "frames", bus.frames);
+    cJSON_AddNumberToObject(added, "targets_lost", bus.targets_lost);
+    cJSON_AddNumberToObject(added, "setpoints_clipped", bus.setpoints_clipped);
+    cJSON_AddNumberToObject(added, "samples_clipped", bus.samples_clipped);
+}
+
+static int print_json(const struct measuring *self, const struct run *run, const struct measure_report *report,
+                      double rate_per_s, struct error *out_error)
 {
     cJSON *object = cJSON_CreateObject();
-    cJSON_AddStringToObject(object, "out", path);
+    cJSON_AddStringToObject(object, "out", self->request->out);
     cJSON_AddStringToObject(object, "ended", end_name(report->end));
     cJSON_AddStringToObject(object, "stopped_by", report->stopped_by);
     cJSON_AddNumberToObject(object, "rows", (double)run->rows);
@@ -211,9 +224,22 @@ static int print_json(const char *path, const struct run *run, const struct meas
     cJSON_AddNumberToObject(object, "samples_late", report->counters.samples_late);
     cJSON_AddNumberToObject(object, "torque_clipped", report->torque_clipped);
     cJSON_AddNumberToObject(object, "samples_per_s", rate_per_s);
+    if (self->door) {
+        add_bus(self->door, object);
+    }
     int status = json_print_stdout(object, out_error);
     cJSON_Delete(object);
     return status;
+}
+
+static void print_bus(const struct door *door)
+{
+    struct door_statistics bus;
+    door_read_statistics(door, &bus);
+    printf(
+        "  bus at %.3g Mbit/s, load %.0f %%, %u frames; %u set-points lost, %u clipped, %u measured values clipped\n",
+        1e-6 * bus.bitrate, 100.0 * bus.bus_load, (unsigned)bus.frames, (unsigned)bus.targets_lost,
+        (unsigned)bus.setpoints_clipped, (unsigned)bus.samples_clipped);
 }
 
 static void print_summary(const char *path, const struct run *run, const struct measure_report *report,
@@ -227,7 +253,15 @@ static void print_summary(const char *path, const struct run *run, const struct 
 
 static int keep(const struct measuring *self, struct run *run, const char *source, struct error *out_error)
 {
-    if (!run_set_key(run, "drive", source)) {
+    bool set = run_set_key(run, "drive", source);
+    if (set && self->door) {
+        struct door_statistics bus;
+        char load[32];
+        door_read_statistics(self->door, &bus);
+        snprintf(load, sizeof load, "%.4g", bus.bus_load);
+        set = run_set_key(run, "bus_load", load);
+    }
+    if (!set) {
         return error_set(out_error, error_refused, "%s: not written: memory is short", self->request->out);
     }
     return run_write(self->request->out, run, out_error);
@@ -237,10 +271,13 @@ static int report_run(const struct measuring *self, const struct run *run, const
                       const struct progress *progress, struct error *out_error)
 {
     if (progress->context->json) {
-        return print_json(self->request->out, run, report, progress->rate_per_s, out_error);
+        return print_json(self, run, report, progress->rate_per_s, out_error);
     }
     if (!progress->context->quiet) {
         print_summary(self->request->out, run, report, progress->rate_per_s);
+        if (self->door) {
+            print_bus(self->door);
+        }
     }
     return 0;
 }

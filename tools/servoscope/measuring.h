@@ -9,6 +9,7 @@
 #include "lab/measure/table_bytes.h"
 #include "lab/record/error.h"
 #include "tools/servoscope/command.h"
+#include "tools/servoscope/door.h"
 #include "tools/servoscope/options.h"
 
 enum { measuring_options_max = 16 };
@@ -31,6 +32,7 @@ struct measuring {
     const struct measuring_request *request;
     struct table_bytes table;
     struct measure_plan plan;
+    const struct door *door; ///< whose bus is to be reported; NULL: there is none
 };
 
 void measuring_defaults(struct measuring_request *out_request);
@@ -62,7 +64,8 @@ void measuring_free(struct measuring *self);
     "  --limit-position RAD --limit-velocity RAD_PER_S --limit-torque NM\n"                                            \
     "                       ramp down and stop beyond these, position from where the axis stood; a table that asks "   \
     "for more\n"                                                                                                       \
-    "                       torque is refused (a linear table: m, m/s, N)\n"                                           \
+    "                       torque is refused (a linear table: m, m/s, N); the torque limit is set in the drive too\n" \
+    "                       (default there: 3 times the table's largest torque)\n"                                     \
     "  --out RUN.csv        the recording\n"
 
 #endif

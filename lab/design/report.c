@@ -1,0 +1,190 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/design/report.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+static const double two_pi = 6.283185307179586;
+
+/// One quantity of the design in every form that the report needs.
+struct row {
+    const char *name, *unit;
+    const double *series;
+    double limit; ///< 0: none
+    double peak, peak_continuous;
+};
+
+enum { row_torque, row_velocity, row_position, row_acceleration, row_count };
+
+static void make_rows(const struct design_request *request, const struct design_result *result,
+                      struct row rows[row_count])
+{
+    const bool linear = request->linear;
+    const struct design_limits *limits = &request->limits;
+    const struct design_peaks *at = &result->peak;
+    const struct design_peaks *between = &result->peak_continuous;
+    rows[row_torque] = (struct row){
+        linear ? "force" : "torque", linear ? "N" : "Nm",      result->torque_Nm,
+        limits->torque_Nm,           at->torque_Nm,            between->torque_Nm,
+    };
+    rows[row_velocity] = (struct row){
+        "velocity",
+        linear ? "m/s" : "rad/s",
+        result->velocity_rad_per_s,
+        limits->velocity_rad_per_s,
+        at->velocity_rad_per_s,
+        between->velocity_rad_per_s,
+    };
+    rows[row_position] = (struct row){
+        "position", linear ? "m" : "rad", result->position_rad, limits->position_rad, at->position_rad,
+        between->position_rad,
+    };
+    rows[row_acceleration] = (struct row){
+        "acceleration",
+        linear ? "m/s2" : "rad/s2",
+        result->acceleration_rad_per_s2,
+        limits->acceleration_rad_per_s2,
+        at->acceleration_rad_per_s2,
+        between->acceleration_rad_per_s2,
+    };
+}
+
+static void add_panel(struct figure *figure, const struct row *row, size_t count, const double *time_s,
+                      const double *series)
+{
+    char label[figure_text_max];
+    snprintf(label, sizeof label, "%s in %s", row->name, row->unit);
+    struct figure_panel *panel = figure_add_panel(figure, label, axis_linear);
+    panel->height = 130;
+    figure_add_line(panel, row->name, count, time_s, series);
+    if (row->limit > 0) {
+        snprintf(label, sizeof label, "limit %.4g", row->limit);
+        figure_add_limit(panel, label, row->limit);
+        figure_add_limit(panel, "", -row->limit);
+    }
+}
+
+/// One period in the order of playing, closed by its first sample: `values` holds (row_count + 1) x (N + 1) numbers.
+static void add_period(struct page *page, const struct design_result *result, double step_s, const struct row *rows,
+                       double *values)
+{
+    const size_t period = result->period_samples;
+    const size_t points = period + 1;
+    struct figure figure;
+    figure_start(&figure, "time in s", axis_linear);
+    for (size_t n = 0; n < points; n++) {
+        values[n] = step_s * (double)n;
+        for (size_t i = 0; i < row_count; i++) {
+            values[(i + 1) * points + n] = rows[i].series[(result->start_index + n) % period];
+        }
+    }
+    for (size_t i = 0; i < row_count; i++) {
+        // Acceleration is torque over inertia: its panel says nothing new unless it has a limit of its own.
+        if (i != row_acceleration || rows[i].limit > 0) {
+            add_panel(&figure, &rows[i], points, values, values + (i + 1) * points);
+        }
+    }
+    page_add_figure(page, &figure,
+                    "One period as it is played, from rest: it begins at sample %zu of the table, at a zero crossing of "
+                    "the velocity unless told otherwise.",
+                    result->start_index);
+}
+
+static void add_spectrum(struct page *page, const struct design_request *request, const struct design_result *result,
+                         double line_hz, const struct row *rows, double *values)
+{
+    const size_t count = result->bin_count;
+    double *frequency_hz = values, *velocity = values + count, *torque = values + 2 * count;
+    for (size_t k = 0; k < count; k++) {
+        const double omega = two_pi * line_hz * result->bins[k];
+        frequency_hz[k] = line_hz * result->bins[k];
+        velocity[k] = omega * result->amplitude_rad[k];
+        torque[k] = request->inertia_kgm2 * omega * omega * result->amplitude_rad[k];
+    }
+    struct figure figure;
+    char label[figure_text_max];
+    figure_start(&figure, "frequency in Hz", axis_log);
+    snprintf(label, sizeof label, "%s amplitude in %s", rows[row_torque].name, rows[row_torque].unit);
+    struct figure_panel *panel = figure_add_panel(&figure, label, axis_linear);
+    panel->height = 110;
+    panel->from_zero = true;
+    figure_add_stems(panel, rows[row_torque].name, count, frequency_hz, torque);
+    snprintf(label, sizeof label, "velocity amplitude in %s", rows[row_velocity].unit);
+    panel = figure_add_panel(&figure, label, axis_linear);
+    panel->height = 110;
+    panel->from_zero = true;
+    figure_add_stems(panel, "velocity", count, frequency_hz, velocity)->colour = figure_vermilion;
+    page_add_figure(page, &figure,
+                    "Amplitudes of the %zu lines. They follow from the limits: a line gets what it may have where its "
+                    "tightest limit binds.",
+                    count);
+}
+
+static void add_table(struct page *page, const struct row *rows)
+{
+    static const char *const heads[] = {"peak of", "at the samples", "in between", "limit", "used", "unit"};
+    page_start_table(page, "Peaks against limits.", "lrrrrl", heads);
+    for (size_t i = 0; i < row_count; i++) {
+        char at[32], between[32], limit[32], used[32];
+        const struct row *row = &rows[i];
+        snprintf(at, sizeof at, "%.5g", row->peak);
+        snprintf(between, sizeof between, "%.5g", row->peak_continuous);
+        snprintf(limit, sizeof limit, "%.5g", row->limit);
+        snprintf(used, sizeof used, "%.1f %%", 100 * row->peak_continuous / row->limit);
+        const bool limited = row->limit > 0;
+        const char *const cells[] = {row->name, at, between, limited ? limit : NULL, limited ? used : NULL, row->unit};
+        page_add_row(page, cells);
+    }
+    page_end_table(page);
+}
+
+static void add_pairs(struct page *page, const struct design_request *request, const struct design_result *result,
+                      double line_hz, const struct row *rows)
+{
+    const char *unit = rows[row_torque].unit;
+    page_start_pairs(page);
+    page_add_pair(page, "method", "%s, limits held %s", result->method,
+                  request->grid == design_grid_continuous ? "at every instant" : "at the samples");
+    page_add_pair(page, "lines", "%zu, %.6g to %.6g Hz", result->bin_count, line_hz * result->bins[0],
+                  line_hz * result->bins[result->bin_count - 1]);
+    page_add_pair(page, "period", "%zu samples, %.6g s", result->period_samples, 1 / line_hz);
+    page_add_pair(page, request->linear ? "moved mass" : "inertia", "%.6g %s", request->inertia_kgm2,
+                  request->linear ? "kg" : "kg m2");
+    page_add_pair(page, request->linear ? "effective force" : "effective torque", "%.4f %s, crest factor %.3f",
+                  result->effective_torque_Nm, unit, result->crest_factor);
+    if (result->effective_torque_continuous_Nm < result->effective_torque_Nm) {
+        page_add_pair(page, "held between samples too", "it would be %.4f %s", result->effective_torque_continuous_Nm,
+                      unit);
+    }
+    page_add_pair(page, "bound", "%.4f %s, reached: %.0f %%; no phases give more", result->bound_Nm, unit,
+                  100 * result->effective_torque_Nm / result->bound_Nm);
+    page_add_pair(page, "start", "sample %zu", result->start_index);
+    page_end_pairs(page);
+}
+
+void design_report_section(struct page *page, const struct design_request *request, const struct design_result *result)
+{
+    const double rate_hz = (double)request->rate_numerator_hz / request->rate_denominator;
+    const double line_hz = rate_hz / (double)result->period_samples;
+    // The lines fit too: there are fewer than half as many of them as samples.
+    double *values = malloc((row_count + 1) * (result->period_samples + 1) * sizeof *values);
+    struct row rows[row_count];
+    make_rows(request, result, rows);
+    page_add_section(page, "Excitation");
+    page_add_paragraph(page,
+                       "A multisine of %zu lines as strong as the limits allow: effective %s %.4f %s, peaks of "
+                       "%.4g %s and %.4g %s.",
+                       result->bin_count, rows[row_torque].name, result->effective_torque_Nm, rows[row_torque].unit,
+                       result->peak.torque_Nm, rows[row_torque].unit, result->peak.velocity_rad_per_s,
+                       rows[row_velocity].unit);
+    if (values) {
+        add_period(page, result, 1 / rate_hz, rows, values);
+        add_spectrum(page, request, result, line_hz, rows, values);
+    } else {
+        page_add_paragraph(page, "Memory was short for the figures of this section.");
+    }
+    add_table(page, rows);
+    add_pairs(page, request, result, line_hz, rows);
+    free(values);
+}

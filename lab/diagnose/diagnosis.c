@@ -1,0 +1,346 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/diagnose/diagnosis.h"
+
+#include "lab/diagnose/judge.h"
+#include "lab/diagnose/recording.h"
+#include "lab/diagnose/search.h"
+#include "lab/diagnose/validate.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { refit_iterations = 10 };
+
+/// Everything a diagnosis works on; freed as one.
+struct work {
+    size_t fit_count, validate_count;
+    struct recording *recordings; ///< fit runs, then validation runs
+    struct evidence *evidence;    ///< likewise
+    struct fit_data fit_data, validate_data;
+    struct run parts[2];          ///< of a run of which a part is held back; columns borrow the run's values
+    struct fit fit;
+};
+
+static void work_free(struct work *w)
+{
+    for (size_t i = 0; i < w->fit_count + w->validate_count; i++) {
+        if (w->evidence)
+            evidence_free(&w->evidence[i]);
+        if (w->recordings)
+            recording_free(&w->recordings[i]);
+    }
+    free(w->evidence);
+    free(w->recordings);
+    free(w->parts[0].columns);
+    free(w->parts[1].columns);
+    fit_free(&w->fit);
+}
+
+/// A view of rows from .. from + rows of a run.
+static bool run_part(const struct run *run, size_t from, size_t rows, size_t settle_periods, struct run *out)
+{
+    *out = *run;
+    out->rows = rows;
+    out->columns = malloc(run->column_count * sizeof *out->columns);
+    if (!out->columns)
+        return false;
+    for (size_t i = 0; i < run->column_count; i++)
+        out->columns[i] = (struct run_column){run->columns[i].name, run->columns[i].data + from};
+    out->periods = 0;
+    out->settle_periods = settle_periods;
+    out->has_settle_periods = settle_periods > 0;
+    return true;
+}
+
+/// Splits the only run: two thirds to fit, one third to validate; by whole periods if it has at least six counted ones.
+static bool hold_back(const struct run *run, struct work *w)
+{
+    size_t n = run->period_samples;
+    if (n >= 16 && run->rows >= 7 * n) {
+        size_t periods = run->rows / n, settle = run->settle_periods > 0 ? run->settle_periods : 1;
+        size_t counted = periods - settle, held = counted / 3;
+        size_t from = (periods - held - 1) * n; // one period more, to lead into the first that counts
+        return run_part(run, 0, (periods - held) * n, settle, &w->parts[0]) &&
+               run_part(run, from, (held + 1) * n, 1, &w->parts[1]);
+    }
+    size_t rows = run->rows / 3 * 2;
+    return run_part(run, 0, rows, 0, &w->parts[0]) && run_part(run, rows, run->rows - rows, 0, &w->parts[1]);
+}
+
+static int prepare_recordings(const struct diagnosis_request *request, struct work *w, struct diagnosis *d,
+                              struct error *out_error)
+{
+    d->held_back = request->validate_count == 0;
+    w->fit_count = request->fit_count;
+    w->validate_count = d->held_back ? 1 : request->validate_count;
+    size_t count = w->fit_count + w->validate_count;
+    w->recordings = calloc(count, sizeof *w->recordings);
+    w->evidence = calloc(count, sizeof *w->evidence);
+    if (!w->recordings || !w->evidence || (d->held_back && !hold_back(&request->fit[0], w)))
+        return error_set(out_error, error_refused, "not enough memory");
+    for (size_t i = 0; i < count; i++) {
+        const struct run *run = i < w->fit_count ? &request->fit[i] : &request->validate[i - w->fit_count];
+        if (d->held_back && (i == 0 || i == w->fit_count))
+            run = &w->parts[i == 0 ? 0 : 1];
+        int status = recording_prepare(run, &w->recordings[i], out_error);
+        if (status != 0)
+            return status;
+        const struct recording *first = &w->recordings[0], *r = &w->recordings[i];
+        if (r->rate_hz != first->rate_hz || r->linear != first->linear ||
+            !r->block.torque_ref != !first->block.torque_ref)
+            return error_set(out_error, error_refused,
+                             "%s: %g Hz, %s, %s torque reference; %s: %g Hz, %s, %s: all runs have to be alike", run->path,
+                             r->rate_hz, r->linear ? "linear" : "rotary", r->block.torque_ref ? "with" : "without",
+                             request->fit[0].path, first->rate_hz, first->linear ? "linear" : "rotary",
+                             first->block.torque_ref ? "with" : "without");
+    }
+    return 0;
+}
+
+/// Inertia of a rigid body by least squares of torque on acceleration: a start for the fit.
+static double guess_inertia(const struct recording *r)
+{
+    const struct stretch *b = &r->block;
+    double tt = 0.0, aa = 0.0;
+    for (size_t n = 1; n + 1 < b->samples; n++) {
+        double a = 0.5 * r->rate_hz * (b->velocity[n + 1] - b->velocity[n - 1]);
+        tt += a * b->torque[n];
+        aa += a * a;
+    }
+    return aa > 0.0 && tt > 0.0 ? tt / aa : r->coverage.torque_rms / fmax(r->coverage.velocity_rms * r->rate_hz, 1e-12);
+}
+
+static int choose_model(const struct diagnosis_request *request, const struct recording *first, struct diagnosis *d,
+                        struct error *out_error)
+{
+    d->linear = first->linear;
+    d->model_given = request->model != NULL;
+    if (request->model) {
+        d->given = *request->model;
+        if (d->given.linear != first->linear)
+            return error_set(out_error, error_refused, "the model is %s and %s is %s: use a model in the units of the runs",
+                             d->given.linear ? "linear (kg, N)" : "rotary (kgm2, Nm)", request->fit[0].path,
+                             first->linear ? "linear (m, N)" : "rotary (rad, Nm)");
+    } else {
+        sim_model_default(&d->given);
+        d->given.linear = first->linear;
+        d->given.motor_inertia_kgm2 = guess_inertia(first);
+        d->given.sensors = (struct sim_sensors){0};
+    }
+    d->given.sample_rate_hz = first->rate_hz;
+    return 0;
+}
+
+static int prepare_evidence(struct work *w, const struct diagnosis *d, struct error *out_error)
+{
+    double inertia = d->given.motor_inertia_kgm2 + d->given.load_inertia_kgm2;
+    for (size_t i = 0; i < w->fit_count + w->validate_count; i++)
+        if (!evidence_init(&w->evidence[i], &w->recordings[i], inertia))
+            return error_set(out_error, error_refused, "not enough memory");
+    w->fit_data = (struct fit_data){.runs = w->fit_count, .evidence = w->evidence};
+    w->validate_data = (struct fit_data){.runs = w->validate_count, .evidence = w->evidence + w->fit_count};
+    for (size_t i = 0; i < w->fit_count; i++)
+        w->fit_data.values += w->evidence[i].values;
+    for (size_t i = 0; i < w->validate_count; i++)
+        w->validate_data.values += w->evidence[w->fit_count + i].values;
+    if (!fit_init(&w->fit, &w->fit_data))
+        return error_set(out_error, error_refused, "not enough memory");
+    return 0;
+}
+
+static bool estimate_noise(struct evidence *evidence, size_t count, const struct sim_model *model)
+{
+    bool good = true;
+    for (size_t i = 0; i < count; i++)
+        good = evidence_estimate_noise(&evidence[i], model, NULL) && good;
+    return good;
+}
+
+static bool tell(const struct diagnosis_request *request, const char *what)
+{
+    return !request->progress || request->progress(request->user, what);
+}
+
+/// Refits the given structure, then searches; the noise is estimated anew under every better model, because a wrong model's
+/// errors scatter with the motion and would pass for noise.
+static bool find_causes(const struct diagnosis_request *request, struct work *w, struct diagnosis *d, struct hypothesis *h)
+{
+    struct sim_model model = d->given;
+    hypothesis_init(h, &d->given, !d->model_given, w->recordings[0].block.torque_ref != NULL);
+    for (int pass = 0; pass < 2; pass++) {
+        if (!estimate_noise(w->evidence, w->fit_count, &model) || !fit_run(&w->fit, &w->fit_data, h, refit_iterations))
+            return false;
+        hypothesis_model(h, NULL, &model);
+    }
+    d->refitted_model = model;
+    struct search_options options = {.causes_max = 5, .progress = request->progress, .user = request->user};
+    for (int pass = 0; pass < 3; pass++) {
+        if (!estimate_noise(w->evidence, w->fit_count, &model) ||
+            !search_run(&w->fit_data, &w->recordings[0].coverage, &options, h, &w->fit))
+            return false;
+        hypothesis_model(h, NULL, &model);
+    }
+    d->extended_model = model;
+    d->fit_misfit = w->fit.cost / (double)w->fit_data.values;
+    return true;
+}
+
+static void describe_cause(const struct work *w, const struct diagnosis *d, const struct hypothesis *h, int effect,
+                           struct diagnosis_cause *out)
+{
+    const struct sim_effect *e = sim_effects[effect];
+    memset(out, 0, sizeof *out);
+    out->effect = effect;
+    out->evidence = search_evidence(&w->fit_data, h, &w->fit, effect);
+    hypothesis_parameters(h, effect, w->fit.covariance, out->values, out->deviations);
+    for (size_t i = 0; i < e->parameter_count; i++)
+        if (e->parameters[i].model_offset != SIZE_MAX)
+            memcpy(&out->nominal[i], (const char *)&d->given + e->parameters[i].model_offset, sizeof(double));
+    // Residuals whose mean square is above one carry more than noise: the deviations grow with it.
+    double misfit = sqrt(fmax(d->fit_misfit, 1.0));
+    for (size_t i = 0; i < e->parameter_count; i++)
+        out->deviations[i] *= misfit;
+    struct sim_finding finding = {out->values, out->deviations, out->nominal, d->linear};
+    e->say(&finding, out->says, sizeof out->says);
+}
+
+static int stronger(const void *a, const void *b)
+{
+    double x = ((const struct diagnosis_cause *)a)->evidence, y = ((const struct diagnosis_cause *)b)->evidence;
+    return (x < y) - (x > y);
+}
+
+static void list_causes(const struct work *w, struct diagnosis *d, const struct hypothesis *h, const struct judgement *judgement)
+{
+    for (int e = 0; sim_effects[e]; e++) {
+        if (!h->named[e])
+            continue;
+        bool stands = judgement->stands[e];
+        size_t *count = stands ? &d->cause_count : &d->candidate_count;
+        struct diagnosis_cause *list = stands ? d->causes : d->candidates;
+        if (*count < diagnosis_causes_max)
+            describe_cause(w, d, h, e, &list[(*count)++]);
+    }
+    qsort(d->causes, d->cause_count, sizeof d->causes[0], stronger);
+    qsort(d->candidates, d->candidate_count, sizeof d->candidates[0], stronger);
+}
+
+/// What was not asked of the data because the data cannot answer.
+static void list_untestable(const struct work *w, struct diagnosis *d, const struct hypothesis *h)
+{
+    const struct sim_coverage *coverage = &w->recordings[0].coverage;
+    for (int e = 0; sim_effects[e]; e++) {
+        struct diagnosis_untestable *u = &d->untestable[d->untestable_count];
+        u->effect = e;
+        if (h->named[e])
+            continue;
+        if (sim_effects[e]->place == sim_place_actuator && !h->actuator_seen)
+            snprintf(u->why, sizeof u->why, "no torque reference was recorded beside the torque");
+        else if (!sim_effects[e]->blind || !sim_effects[e]->blind(coverage, u->why, sizeof u->why))
+            continue;
+        d->untestable_count++;
+    }
+}
+
+static void list_deviations(const struct work *w, struct diagnosis *d, const struct hypothesis *h)
+{
+    for (int e = 0; sim_effects[e]; e++) {
+        if (!h->named[e])
+            continue;
+        double values[sim_effect_parameters_max] = {0}, deviations[sim_effect_parameters_max] = {0};
+        hypothesis_parameters(h, e, w->fit.covariance, values, deviations);
+        for (size_t i = 0; i < sim_effects[e]->parameter_count; i++) {
+            const struct sim_parameter *p = &sim_effects[e]->parameters[i];
+            model_deviations_add(&d->deviations, p->model_offset == SIZE_MAX ? sim_effects[e]->id : NULL,
+                                 d->linear ? p->linear_name : p->name, deviations[i]);
+        }
+    }
+}
+
+static void name_runs(const struct diagnosis_request *request, struct diagnosis *d)
+{
+    size_t used = 0;
+    for (size_t i = 0; i < request->fit_count && used < sizeof d->runs - 1; i++)
+        used += (size_t)snprintf(d->runs + used, sizeof d->runs - used, "%s%s", i > 0 ? ", " : "",
+                                 request->fit[i].path ? request->fit[i].path : "run");
+}
+
+static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesis *h)
+{
+    // The noise of the validation data under the extended model; one set of weights for all three models.
+    if (!estimate_noise(w->evidence + w->fit_count, w->validate_count, &d->extended_model))
+        return false;
+    d->nominal = validate_figures(&w->validate_data, &d->given);
+    d->refitted = validate_figures(&w->validate_data, &d->refitted_model);
+    d->extended = validate_figures(&w->validate_data, &d->extended_model);
+    d->noise_floor_nrmse = validate_noise_floor(&w->validate_data, &d->extended_model);
+    struct judgement judgement;
+    if (!judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, d->extended.whitened_rms, &judgement))
+        return false;
+    d->verdict = judgement.unexplained ? diagnosis_unexplained
+                 : judgement.count > 0 ? diagnosis_explained
+                                       : diagnosis_no_discrepancy;
+    list_causes(w, d, h, &judgement);
+    list_untestable(w, d, h);
+    list_deviations(w, d, h);
+    if (judgement.unexplained) {
+        snprintf(d->where, sizeof d->where, "%s", judgement.where);
+        d->unexplained_share = fmin(fmax((pow(d->extended.whitened_rms, 2.0) - 1.0) /
+                                             fmax(pow(d->nominal.whitened_rms, 2.0) - 1.0, 1e-12), 0.0), 1.0);
+    } else {
+        d->tie_count = judge_ties(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, d->ties, diagnosis_ties_max);
+    }
+    return validate_curves(&w->validate_data, d, &d->curves);
+}
+
+int diagnosis_run(const struct diagnosis_request *request, struct diagnosis *out_diagnosis, struct error *out_error)
+{
+    struct diagnosis *d = out_diagnosis;
+    struct work w = {0};
+    struct hypothesis h;
+    memset(d, 0, sizeof *d);
+    tell(request, "reading the motion");
+    int status = prepare_recordings(request, &w, d, out_error);
+    if (status == 0)
+        status = choose_model(request, &w.recordings[0], d, out_error);
+    if (status == 0)
+        status = prepare_evidence(&w, d, out_error);
+    if (status == 0) {
+        name_runs(request, d);
+        snprintf(d->motion_from, sizeof d->motion_from, "%s", w.recordings[0].motion_from);
+        tell(request, "refitting the given model");
+        if (!find_causes(request, &w, d, &h) || !(tell(request, "judging on data the fit has not seen"), conclude(&w, d, &h)))
+            status = error_set(out_error, error_refused, "%s: the fit failed: not enough memory, or a model that the data cannot "
+                                                         "determine", request->fit[0].path);
+    }
+    work_free(&w);
+    if (status != 0)
+        diagnosis_free(d);
+    return status;
+}
+
+void diagnosis_free(struct diagnosis *self)
+{
+    struct diagnosis_curves *c = &self->curves;
+    double *all[] = {c->frequency_hz, c->torque_Nm, c->nominal_Nm, c->refitted_Nm, c->extended_Nm, c->two_sigma_Nm, c->time_s,
+                     c->position, c->velocity, c->friction_measured, c->residual_nominal, c->residual_extended,
+                     c->curve_velocity, c->curve_nominal, c->curve_extended};
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
+        free(all[i]);
+    memset(self, 0, sizeof *self);
+}
+
+const char *diagnosis_verdict_str(enum diagnosis_verdict verdict)
+{
+    switch (verdict) {
+    case diagnosis_explained:
+        return "explained";
+    case diagnosis_unexplained:
+        return "unexplained";
+    case diagnosis_no_discrepancy:
+        return "no_discrepancy";
+    }
+    return "unknown";
+}

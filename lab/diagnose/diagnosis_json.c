@@ -1,0 +1,129 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/diagnose/diagnosis.h"
+#include "lab/diagnose/wording.h"
+
+#include <cjson/cJSON.h>
+#include <math.h>
+
+/// A number, or null where there is none: JSON has no NaN.
+static bool add_number(cJSON *object, const char *name, double value)
+{
+    return isfinite(value) ? cJSON_AddNumberToObject(object, name, value) != NULL
+                           : cJSON_AddNullToObject(object, name) != NULL;
+}
+
+static bool add_text(cJSON *object, const char *name, const char *text)
+{
+    return cJSON_AddStringToObject(object, name, text) != NULL;
+}
+
+/// A new object at the end of an array, NULL if memory is short.
+static cJSON *append_object(cJSON *array)
+{
+    cJSON *object = cJSON_CreateObject();
+    if (object && !cJSON_AddItemToArray(array, object)) {
+        cJSON_Delete(object);
+        return NULL;
+    }
+    return object;
+}
+
+static bool add_parameters(cJSON *cause, const struct diagnosis_cause *found, const struct diagnosis *self)
+{
+    const struct sim_effect *effect = sim_effects[found->effect];
+    cJSON *parameters = cJSON_AddObjectToObject(cause, "parameters");
+    bool ok = parameters != NULL;
+    for (size_t i = 0; ok && i < effect->parameter_count; i++) {
+        const struct sim_parameter *parameter = &effect->parameters[i];
+        cJSON *object = cJSON_AddObjectToObject(parameters, self->linear ? parameter->linear_name : parameter->name);
+        ok = object && add_number(object, "value", found->values[i]) &&
+             add_number(object, "std", found->deviations[i]) && add_number(object, "given", found->nominal[i]);
+    }
+    return ok;
+}
+
+static bool add_causes(cJSON *root, const char *name, const struct diagnosis_cause *causes, size_t count,
+                       const struct diagnosis *self)
+{
+    cJSON *array = cJSON_AddArrayToObject(root, name);
+    bool ok = array != NULL;
+    for (size_t i = 0; ok && i < count; i++) {
+        cJSON *object = append_object(array);
+        ok = object && add_text(object, "id", sim_effects[causes[i].effect]->id) &&
+             add_number(object, "evidence", causes[i].evidence) && add_parameters(object, &causes[i], self) &&
+             add_text(object, "says", causes[i].says);
+    }
+    return ok;
+}
+
+static bool add_ties(cJSON *root, const struct diagnosis *self)
+{
+    cJSON *array = cJSON_AddArrayToObject(root, "ties");
+    bool ok = array != NULL;
+    for (size_t i = 0; ok && i < self->tie_count; i++) {
+        const struct diagnosis_tie *tie = &self->ties[i];
+        const char *ids[] = {sim_effects[tie->effects[0]]->id, sim_effects[tie->effects[1]]->id};
+        cJSON *object = append_object(array);
+        cJSON *names = object ? cJSON_CreateStringArray(ids, 2) : NULL;
+        ok = names && cJSON_AddItemToObject(object, "causes", names) && add_text(object, "next", tie->next);
+    }
+    return ok;
+}
+
+static bool add_untestable(cJSON *root, const struct diagnosis *self)
+{
+    cJSON *array = cJSON_AddArrayToObject(root, "untestable");
+    bool ok = array != NULL;
+    for (size_t i = 0; ok && i < self->untestable_count; i++) {
+        cJSON *object = append_object(array);
+        ok = object && add_text(object, "id", sim_effects[self->untestable[i].effect]->id) &&
+             add_text(object, "why", self->untestable[i].why);
+    }
+    return ok;
+}
+
+static bool add_figures(cJSON *root, const char *name, const struct diagnosis_figures *figures)
+{
+    cJSON *object = cJSON_AddObjectToObject(root, name);
+    return object && add_number(object, "validation_nrmse", figures->validation_nrmse) &&
+           add_number(object, "whitened_rms", figures->whitened_rms);
+}
+
+static bool add_unexplained(cJSON *root, const struct diagnosis *self)
+{
+    if (self->verdict != diagnosis_unexplained) {
+        return true;
+    }
+    cJSON *object = cJSON_AddObjectToObject(root, "unexplained");
+    return object && add_text(object, "where", self->where) && add_number(object, "share", self->unexplained_share);
+}
+
+/// What a reader of the file alone would miss: the verdict as a sentence, and what it rests on.
+static bool add_context(cJSON *root, const struct diagnosis *self)
+{
+    char headline[wording_size], gain[wording_size];
+    wording_headline(self, headline);
+    wording_gain(self, gain);
+    return add_text(root, "headline", headline) && add_text(root, "gain", gain) && add_text(root, "runs", self->runs) &&
+           add_text(root, "motion_from", self->motion_from) && cJSON_AddBoolToObject(root, "linear", self->linear) &&
+           cJSON_AddBoolToObject(root, "model_given", self->model_given) &&
+           cJSON_AddBoolToObject(root, "held_back", self->held_back) &&
+           add_number(root, "fit_misfit", self->fit_misfit);
+}
+
+cJSON *diagnosis_json(const struct diagnosis *self)
+{
+    cJSON *root = cJSON_CreateObject();
+    bool ok = root && add_text(root, "verdict", diagnosis_verdict_str(self->verdict)) &&
+              add_causes(root, "causes", self->causes, self->cause_count, self) &&
+              add_causes(root, "candidates", self->candidates, self->candidate_count, self) && add_ties(root, self) &&
+              add_untestable(root, self) && add_figures(root, "nominal", &self->nominal) &&
+              add_figures(root, "refitted", &self->refitted) && add_figures(root, "extended", &self->extended) &&
+              add_number(root, "noise_floor_nrmse", self->noise_floor_nrmse) && add_unexplained(root, self) &&
+              add_context(root, self);
+    if (!ok) {
+        cJSON_Delete(root);
+        return NULL;
+    }
+    return root;
+}

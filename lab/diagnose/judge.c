@@ -1,0 +1,166 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/diagnose/judge.h"
+
+#include "lab/diagnose/blackbox.h"
+#include "lab/diagnose/predict.h"
+#include "lab/diagnose/search.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { trial_iterations = 6 };
+
+/// Share of the torque's RMS that an effect is responsible for: the model with it against the model with it taken out.
+static double effect_share(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *h,
+                           int effect)
+{
+    struct hypothesis without = *h;
+    struct sim_model with_model, without_model;
+    hypothesis_unname(&without, effect);
+    hypothesis_model(h, NULL, &with_model);
+    hypothesis_model(&without, NULL, &without_model);
+    const struct evidence *e = &data->evidence[0];
+    const struct recording *r = e->recording;
+    size_t n = r->block.samples;
+    double *work = malloc(4 * n * sizeof *work);
+    if (!work)
+        return 0.0;
+    predict(&with_model, &r->block, r->periodic, e->scale_inertia, work, work + n);
+    predict(&without_model, &r->block, r->periodic, e->scale_inertia, work + 2 * n, work + 3 * n);
+    double sum = 0.0;
+    for (size_t i = 0; i < 2 * n; i++) {
+        double d = work[i] - work[2 * n + i];
+        sum += d * d;
+    }
+    free(work);
+    return sqrt(sum / (double)n) / coverage->torque_rms;
+}
+
+/// Evidence for an effect when the black box may explain everything it can.
+static double evidence_beside(const struct blackbox *box, const struct fit_data *data, const struct hypothesis *h,
+                              const struct fit *fit, int effect)
+{
+    struct fit trial;
+    struct hypothesis without = *h;
+    double with_cost, without_cost = 0.0;
+    const unsigned all = (1u << blackbox_groups) - 1u;
+    if (!fit_init(&trial, data))
+        return 0.0;
+    blackbox_gain(box, data, h, fit, all, &with_cost);
+    hypothesis_unname(&without, effect);
+    if (fit_run(&trial, data, &without, trial_iterations))
+        blackbox_gain(box, data, &without, &trial, all, &without_cost);
+    fit_free(&trial);
+    return 0.5 * (without_cost - with_cost);
+}
+
+/// Says where the residual is: the band of frequencies that holds most of it, and what kind of term would explain it.
+static void describe_rest(const struct blackbox *box, const struct fit_data *data, const struct hypothesis *h,
+                          const struct fit *fit, char *out_text, size_t size)
+{
+    enum { bands = 8 };
+    const struct evidence *e = &data->evidence[0];
+    double sums[bands] = {0}, total = 0.0;
+    for (size_t i = 0; i < e->values; i++) {
+        size_t channel, bin = evidence_bin(e, i, &channel);
+        double excess = fit->residual[i] * fit->residual[i] - 1.0;
+        sums[bin * bands / (e->recording->band + 1)] += excess;
+        total += excess;
+    }
+    size_t worst = 0;
+    for (size_t b = 1; b < bands; b++)
+        if (sums[b] > sums[worst])
+            worst = b;
+    double width_hz = (double)(e->recording->band + 1) / bands * e->recording->rate_hz / (double)e->recording->block.samples;
+    double gains[blackbox_groups];
+    int best = 0;
+    for (int g = 0; g < blackbox_groups; g++) {
+        gains[g] = blackbox_gain(box, data, h, fit, 1u << g, NULL);
+        if (gains[g] > gains[best])
+            best = g;
+    }
+    snprintf(out_text, size, "%.3g..%.3g Hz holds %.0f %% of it; %s would explain %.0f %% of it", (double)worst * width_hz,
+             (double)(worst + 1) * width_hz, 100.0 * fmin(fmax(sums[worst] / fmax(total, 1e-9), 0.0), 1.0),
+             blackbox_group_name((enum blackbox_group)best), 100.0 * fmin(2.0 * gains[best] / fmax(total, 1e-9), 1.0));
+}
+
+static void judge_names(const struct blackbox *box, const struct fit_data *data, const struct sim_coverage *coverage,
+                        const struct hypothesis *h, const struct fit *fit, struct judgement *j)
+{
+    const double least_share = 0.004; // of the torque's RMS: less is not worth a name even if it is significant
+    const double dominance = 1000.0;  // of a cause over what stays unexplained
+    for (int e = 0; sim_effects[e]; e++) {
+        if (!h->named[e])
+            continue;
+        bool stands = effect_share(data, coverage, h, e) >= least_share;
+        if (stands && j->unexplained)
+            stands = search_evidence(data, h, fit, e) > dominance * j->leftover ||
+                     evidence_beside(box, data, h, fit, e) > fmax(search_threshold(data, e), 0.1 * j->leftover);
+        j->stands[e] = stands;
+        j->count += stands;
+    }
+}
+
+bool judge(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,
+           const struct fit *fit, double validation_rms, struct judgement *out_judgement)
+{
+    struct judgement *j = out_judgement;
+    struct blackbox box;
+    memset(j, 0, sizeof *j);
+    if (!blackbox_init(&box, data))
+        return false;
+    double left;
+    j->leftover = blackbox_gain(&box, data, hypothesis, fit, (1u << blackbox_groups) - 1u, &left);
+    double scale = fmax(left / (double)data->values, 1.0);
+    double chance = 0.5 * (double)box.columns + 12.0 * sqrt(0.5 * (double)box.columns);
+    const double half_again = 1.5;
+    j->unexplained = j->leftover / scale > chance || fit->cost / (double)data->values > half_again * half_again ||
+                     !(validation_rms < half_again);
+    if (j->unexplained)
+        describe_rest(&box, data, hypothesis, fit, j->where, sizeof j->where);
+    judge_names(&box, data, coverage, hypothesis, fit, j);
+    blackbox_free(&box);
+    return true;
+}
+
+/// Cost of the hypothesis with one named effect replaced by another; infinity if that cannot be tried.
+static double cost_of_swap(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *h,
+                           int out, int in)
+{
+    struct fit trial;
+    struct hypothesis swapped = *h;
+    hypothesis_unname(&swapped, out);
+    if (!hypothesis_may_name(&swapped, in) || !fit_init(&trial, data))
+        return INFINITY;
+    double cost = INFINITY;
+    if (fit_run(&trial, data, &swapped, trial_iterations) && search_add(data, coverage, in, &swapped, &trial))
+        cost = trial.cost;
+    fit_free(&trial);
+    return cost;
+}
+
+size_t judge_ties(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,
+                  const struct fit *fit, struct diagnosis_tie *out_ties, size_t most)
+{
+    const double apart_nats = 6.0;
+    double misfit = fmax(fit->cost / (double)data->values, 1.0);
+    size_t count = 0;
+    for (int out = 0; sim_effects[out]; out++) {
+        if (!hypothesis->named[out])
+            continue;
+        for (int in = 0; sim_effects[in] && count < most; in++) {
+            if (hypothesis->named[in])
+                continue;
+            double cost = cost_of_swap(data, coverage, hypothesis, out, in);
+            if (!(0.5 * (cost - fit->cost) / misfit < apart_nats))
+                continue;
+            struct diagnosis_tie *t = &out_ties[count++];
+            t->effects[0] = out;
+            t->effects[1] = in;
+            snprintf(t->next, sizeof t->next, "measure %s", sim_effects[out]->measure);
+        }
+    }
+    return count;
+}

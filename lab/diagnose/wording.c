@@ -1,0 +1,160 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/diagnose/wording.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+struct wording_units wording_units(const struct diagnosis *self)
+{
+    return self->linear ? (struct wording_units){"force", "N", "m/s"} : (struct wording_units){"torque", "Nm", "rad/s"};
+}
+
+void wording_effect(int effect, char out_text[wording_short])
+{
+    snprintf(out_text, wording_short, "%s", sim_effects[effect]->id);
+    for (char *at = out_text; *at; at++) {
+        if (*at == '_') {
+            *at = ' ';
+        }
+    }
+}
+
+void wording_list(const struct diagnosis_cause *causes, size_t count, size_t size, char *out_text)
+{
+    size_t used = 0;
+    out_text[0] = '\0';
+    for (size_t i = 0; i < count && used < size; i++) {
+        char name[wording_short];
+        wording_effect(causes[i].effect, name);
+        const char *joint = i == 0 ? "" : i + 1 == count ? " and " : ", ";
+        used += (size_t)snprintf(out_text + used, size - used, "%s%s", joint, name);
+    }
+}
+
+void wording_percent(double share, char out_text[wording_short])
+{
+    double percent = 100.0 * share;
+    if (!isfinite(percent)) {
+        snprintf(out_text, wording_short, "unknown");
+    } else if (fabs(percent) >= 99.95) {
+        snprintf(out_text, wording_short, "%.0f %%", percent);
+    } else {
+        snprintf(out_text, wording_short, "%#.3g %%", percent);
+    }
+}
+
+void wording_estimate(double value, double deviation, char out_text[2 * wording_short])
+{
+    const size_t size = 2 * wording_short;
+    if (!isfinite(value)) {
+        snprintf(out_text, size, "unknown");
+    } else if (!isfinite(deviation)) {
+        snprintf(out_text, size, "%.4g ± unknown", value);
+    } else if (!(deviation > 0.0)) {
+        snprintf(out_text, size, "%.6g (exact)", value);
+    } else {
+        // Two digits of the deviation, and as many places of the value.
+        int places = 1 - (int)floor(log10(deviation));
+        bool plain = places >= 0 && places <= 6 && fabs(value) < 1e7;
+        if (plain) {
+            snprintf(out_text, size, "%.*f ± %.*f", places, value, places, deviation);
+        } else {
+            snprintf(out_text, size, "%.4g ± %.2g", value, deviation);
+        }
+    }
+}
+
+void wording_headline(const struct diagnosis *self, char out_text[wording_size])
+{
+    char list[wording_size / 2];
+    wording_list(self->causes, self->cause_count, sizeof list, list);
+    bool any = self->cause_count > 0;
+    switch (self->verdict) {
+    case diagnosis_explained:
+        snprintf(out_text, wording_size, any ? "Explained: %s" : "Explained without a further cause%s", list);
+        return;
+    case diagnosis_unexplained:
+        if (any) {
+            snprintf(out_text, wording_size, "Not explained as a whole: %s %s, the rest has no name", list,
+                     self->cause_count > 1 ? "stand" : "stands");
+        } else {
+            snprintf(out_text, wording_size, "Not explained: no known cause fits");
+        }
+        return;
+    case diagnosis_no_discrepancy:
+        break;
+    }
+    snprintf(out_text, wording_size, "No discrepancy: the model fits within what the noise allows");
+}
+
+void wording_gain(const struct diagnosis *self, char out_text[wording_size])
+{
+    struct wording_units units = wording_units(self);
+    char nominal[wording_short], refitted[wording_short], extended[wording_short], noise[wording_short];
+    wording_percent(self->nominal.validation_nrmse, nominal);
+    wording_percent(self->refitted.validation_nrmse, refitted);
+    wording_percent(self->extended.validation_nrmse, extended);
+    wording_percent(self->noise_floor_nrmse, noise);
+    size_t found = self->cause_count + self->candidate_count; // the extended model has both
+    const char *what = self->candidate_count > 0 ? "what was found" : found > 1 ? "the causes" : "the cause";
+    char with_causes[2 * wording_short] = "";
+    if (found > 0) {
+        snprintf(with_causes, sizeof with_causes, ", with %s %s", what, extended);
+    }
+    snprintf(
+        out_text, wording_size,
+        "On data the fit has not seen, %s is off by %s of the measured %s (RMS, excited band), with its own numbers "
+        "refitted %s%s. The noise alone makes %s.",
+        self->model_given ? "the model as given" : "a rigid body without friction", nominal, units.torque, refitted,
+        with_causes, noise);
+}
+
+double wording_removed_share(const struct diagnosis *self)
+{
+    double floor_square = self->noise_floor_nrmse * self->noise_floor_nrmse;
+    double before = self->nominal.validation_nrmse * self->nominal.validation_nrmse - floor_square;
+    double after = self->extended.validation_nrmse * self->extended.validation_nrmse - floor_square;
+    return before > 0.0 ? 1.0 - fmax(after, 0.0) / before : NAN;
+}
+
+/// The measurement that would show an effect, from its own description; false if it has none.
+static bool next_of_effect(int effect, const char *lead, char out_text[wording_size])
+{
+    char name[wording_short];
+    wording_effect(effect, name);
+    const char *measure = sim_effects[effect]->measure;
+    if (measure) {
+        snprintf(out_text, wording_size, "%s %s: measure %s.", lead, name, measure);
+    }
+    return measure != NULL;
+}
+
+size_t wording_next(const struct diagnosis *self, size_t max, char (*out_texts)[wording_size])
+{
+    size_t count = 0;
+    for (size_t i = 0; i < self->tie_count && count < max; i++) {
+        char one[wording_short], other[wording_short];
+        wording_effect(self->ties[i].effects[0], one);
+        wording_effect(self->ties[i].effects[1], other);
+        snprintf(out_texts[count++], wording_size, "To tell %s from %s: measure %s.", one, other, self->ties[i].next);
+    }
+    bool open = self->verdict == diagnosis_unexplained;
+    for (size_t i = 0; open && i < self->candidate_count && count < max; i++) {
+        count += next_of_effect(self->candidates[i].effect, "To confirm or rule out", out_texts[count]);
+    }
+    for (size_t i = 0; open && i < self->untestable_count && count < max; i++) {
+        count += next_of_effect(self->untestable[i].effect, "To test for", out_texts[count]);
+    }
+    if (self->held_back && count < max) {
+        snprintf(
+            out_texts[count++], wording_size,
+            "Record a second run with other phases and give it with --validate: now a part of the only run stands in "
+            "for it.");
+    }
+    if (self->verdict == diagnosis_explained && self->cause_count > 0 && count < max) {
+        snprintf(out_texts[count++], wording_size,
+                 "Take over the extended model (--extended M.json writes it; servoscope simulate and drive run it).");
+    }
+    return count;
+}

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: MIT */
+/// What a diagnosis says in words, once for the report and for the terminal. Every number in a sentence is computed.
+#ifndef SERVOSCOPE_DIAGNOSE_WORDING_H
+#define SERVOSCOPE_DIAGNOSE_WORDING_H
+
+#include "lab/diagnose/diagnosis.h"
+
+enum { wording_short = 32, wording_size = 1024 };
+
+/// Names of quantities and units on a rotary or a linear axis.
+struct wording_units {
+    const char *torque;      ///< "torque", "force"
+    const char *torque_unit; ///< "Nm", "N"
+    const char *speed_unit;  ///< "rad/s", "m/s"
+};
+
+struct wording_units wording_units(const struct diagnosis *self);
+
+/// An effect's id as words: "load bias".
+void wording_effect(int effect, char out_text[wording_short]);
+
+/// The causes' names in one row: "cogging, load bias and inertia"; "" for none.
+void wording_list(const struct diagnosis_cause *causes, size_t count, size_t size, char *out_text);
+
+/// A share as a percentage of three digits: "4.81 %"; "unknown" if it is not finite.
+void wording_percent(double share, char out_text[wording_short]);
+
+/// An estimate with the digits that its standard deviation allows: "0.0312 ± 0.0004", "12 (exact)" for one of 0.
+void wording_estimate(double value, double deviation, char out_text[2 * wording_short]);
+
+/// The verdict in a few words.
+void wording_headline(const struct diagnosis *self, char out_text[wording_size]);
+
+/// What the verdict is worth: how far each model is off on data the fit has not seen, and what the noise allows.
+void wording_gain(const struct diagnosis *self, char out_text[wording_size]);
+
+/// Share of the given model's squared error above the noise floor that the extended model takes away; NaN where the
+/// given model is no worse than the noise floor.
+double wording_removed_share(const struct diagnosis *self);
+
+/// What to do next, each as one sentence; at most `max` of them, returns how many.
+size_t wording_next(const struct diagnosis *self, size_t max, char (*out_texts)[wording_size]);
+
+#endif

@@ -1,0 +1,101 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# servoscope frf from the command line: the response it writes, several runs, what it refuses.
+set -euo pipefail
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+cd "$folder"
+failures=0
+
+fail() {
+    echo "FAILED: $*" >&2
+    failures=$((failures + 1))
+}
+
+# refuse STATUS PART ARGUMENTS...   the program ends with STATUS, says PART in one line on standard error, writes no x.csv
+refuse() {
+    local expected=$1 part=$2 status=0
+    shift 2
+    "$SERVOSCOPE" frf "$@" >out 2>err || status=$?
+    [ "$status" -eq "$expected" ] || fail "status $status instead of $expected: $*"
+    grep -qF -- "$part" err || fail "no '$part' in '$(cat err)': $*"
+    [ "$(wc -l <err)" -eq 1 ] || fail "not one line: $(cat err)"
+    [ ! -s out ] || fail "standard output is not empty: $*"
+    [ ! -e x.csv ] || fail "left behind x.csv: $*"
+}
+
+echo '{"structure": "rigid", "motor_inertia_kgm2": 0.005, "sample_rate_hz": 1000, "seed": 3}' >model.json
+for seed in 1 2 3; do
+    "$SERVOSCOPE" design --rate 1000 --period 500 --lines linear:2:100:2 --limit-torque 1 --inertia 0.005 --method random \
+        --seed "$seed" --out "table$seed" --quiet
+    "$SERVOSCOPE" simulate --model model.json --table "table$seed.mst" --periods 6 --out "run$seed.csv" --quiet
+done
+
+# One run: 1/(J w) at 50 Hz within 5 % (lag and filters of the default model), a standard deviation, 50 lines.
+"$SERVOSCOPE" frf run1.csv --out frf.csv >said
+grep -q '6 of 7 periods of 500 samples count, 1 left out for settling' said || fail "$(cat said)"
+python3 - frf.csv <<'PYTHON' || fail "frf.csv is not the response of the model"
+import csv, math, sys
+rows = list(csv.DictReader(line for line in open(sys.argv[1]) if not line.startswith("#")))
+assert len(rows) == 50 and all(row["valid"] == "1" for row in rows)
+row = [row for row in rows if float(row["frequency_hz"]) == 50.0][0]
+magnitude = math.hypot(float(row["real"]), float(row["imag"]))
+assert abs(magnitude * 0.005 * 2 * math.pi * 50 - 1) < 0.05, magnitude
+assert 0 < float(row["std"]) < 0.1 * magnitude
+PYTHON
+grep -qx '# method: mean' frf.csv || fail "no method key"
+grep -qx '# degrees_of_freedom: 10' frf.csv || fail "degrees of freedom: $(grep degrees frf.csv)"
+
+# --json is one object; settling by option and by the decay; the other method.
+"$SERVOSCOPE" frf run1.csv --settle 2 --method hann --json --out frf.csv >said
+python3 -c '
+import json
+said = json.load(open("said"))
+assert said["method"] == "hann" and said["runs"][0]["settle_periods"] == 2 and said["lines_valid"] == 50, said
+' || fail "--json: $(cat said)"
+"$SERVOSCOPE" frf run1.csv --settle auto --out frf.csv --quiet || fail "--settle auto"
+grep -qx '# settle_from: decay of the transient' frf.csv || fail "$(grep settle frf.csv)"
+
+# A recording of somebody else: no keys, other names; period and lines are found.
+grep -v '^#' run1.csv | sed '1s/torque_Nm/iq/; 1s/velocity_rad_per_s/omega/' >foreign.csv
+"$SERVOSCOPE" frf foreign.csv --map 'torque_Nm=iq,velocity_rad_per_s=omega*1' --out frf.csv >said
+grep -q 'periods of 500 samples count.*period found by its repetition; lines found by their power' said || fail "$(cat said)"
+"$SERVOSCOPE" frf foreign.csv --map 'torque_Nm=iq,velocity_rad_per_s=omega' --period 500 --lines linear:10:20:2 --out frf.csv --quiet
+[ "$(grep -vc '^#' frf.csv)" -eq 7 ] || fail "--lines: $(grep -vc '^#' frf.csv) rows"
+
+# Realisations: total and noise standard deviation apart, degrees of freedom of three runs.
+"$SERVOSCOPE" frf run1.csv run2.csv run3.csv --out frf.csv --quiet
+grep -qx '# realisations: 3' frf.csv || fail "three realisations"
+grep -qx '# degrees_of_freedom: 4' frf.csv || fail "degrees of freedom: $(grep degrees frf.csv)"
+
+# Lost samples: their period does not count, and the summary says so.
+awk -F, 'BEGIN{OFS=","} /^#/{print; next} !seen{print $0",valid"; seen=1; next} {n++; print $0",",(n==1600?0:1)}' run1.csv |
+    sed 's/,,/,/' >lost.csv
+"$SERVOSCOPE" frf lost.csv --out frf.csv >said
+grep -q '5 of 7 periods of 500 samples count, 1 left out for settling, 1 for lost samples (the first in row 1600)' said ||
+    fail "$(cat said)"
+
+# Refusals
+rm -f x.csv
+refuse 2 '--out is missing' run1.csv
+refuse 2 'RUN.csv' --out x.csv
+for method in lpm parametric indirect h1 nonsense; do
+    refuse 2 "method '$method' is not in this build: expected one of mean, hann" run1.csv --method "$method" --out x.csv
+done
+refuse 2 "--settle: 'some', expected a whole number of periods or auto" run1.csv --settle some --out x.csv
+refuse 2 "--settle: '1.5'" run1.csv --settle 1.5 --out x.csv
+refuse 2 '--reference' run1.csv --reference position_ref_rad --out x.csv
+refuse 1 "no column 'force_N'" run1.csv --input force_N --out x.csv
+refuse 1 'none.csv' none.csv --out x.csv
+refuse 1 '1 of 7 periods count (6 left out for settling' run1.csv --settle 6 --out x.csv
+refuse 1 'expected at least 2' run1.csv --period 2000 --out x.csv
+refuse 2 'is not on the period' run1.csv --lines linear:1:20:1 --out x.csv
+sed '/^# periods/d; 700q' run1.csv >short.csv
+refuse 1 'short.csv' short.csv --out x.csv
+awk -F, 'BEGIN{OFS=","} !/^#/{n++; if (n == 50) $3 = "nan"} {print}' run1.csv >nan.csv
+refuse 1 'torque_Nm' nan.csv --out x.csv
+"$SERVOSCOPE" design --rate 1000 --period 500 --lines linear:2:98:2 --limit-torque 1 --inertia 0.005 --method newman --out other --quiet
+"$SERVOSCOPE" simulate --model model.json --table other.mst --periods 3 --out other.csv --quiet
+refuse 1 'run 2 has 49 lines: expected' run1.csv other.csv --out x.csv
+
+[ "$failures" -eq 0 ]

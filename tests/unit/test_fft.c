@@ -1,0 +1,151 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/numeric/fft.h"
+
+#include "unity.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static const double two_pi = 6.283185307179586476925;
+
+/// Relative to the largest value: rounding of a transform, which for a large prime is a sum of that many terms.
+static const double rounding = 2e-13;
+
+enum { longest = 2500 };
+
+static double in[2 * longest], out[2 * longest], back[2 * longest];
+static struct fft_plan *plan;
+
+void setUp(void) {}
+
+void tearDown(void)
+{
+    if (plan)
+        fft_plan_destroy(plan);
+    plan = NULL;
+}
+
+static void plan_for(size_t length)
+{
+    tearDown();
+    plan = fft_plan_create(length);
+    TEST_ASSERT_NOT_NULL(plan);
+}
+
+/// Powers of two and other primes, primes themselves, and lengths as recordings have them.
+static const size_t lengths[] = {1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 16, 17, 25, 49, 60, 97, 128, 210, 343, 499, 1000, 1009, 1024, 2500};
+enum { length_count = sizeof lengths / sizeof lengths[0] };
+
+static void fill(size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        in[2 * i] = sin(1.3 * (double)i) + (double)(i % 3);
+        in[2 * i + 1] = cos(0.7 * (double)(i * i % 101));
+    }
+}
+
+static void test_fft_forward_is_the_defining_sum(void)
+{
+    for (size_t l = 0; l < length_count; l++) {
+        size_t n = lengths[l];
+        plan_for(n);
+        fill(n);
+        fft_forward(plan, in, out);
+        size_t stride = n / 40 + 1; // every bin of short transforms, some forty of long ones
+        for (size_t k = 0; k < n; k += stride) {
+            double re = 0.0, im = 0.0;
+            for (size_t i = 0; i < n; i++) {
+                double angle = -two_pi * (double)(k * i % n) / (double)n;
+                re += in[2 * i] * cos(angle) - in[2 * i + 1] * sin(angle);
+                im += in[2 * i] * sin(angle) + in[2 * i + 1] * cos(angle);
+            }
+            double tolerance = rounding * 3.0 * (double)n;
+            TEST_ASSERT_DOUBLE_WITHIN(tolerance, re, out[2 * k]);
+            TEST_ASSERT_DOUBLE_WITHIN(tolerance, im, out[2 * k + 1]);
+        }
+    }
+}
+
+static void test_fft_inverse_of_forward_is_the_input_times_the_length(void)
+{
+    for (size_t l = 0; l < length_count; l++) {
+        size_t n = lengths[l];
+        plan_for(n);
+        fill(n);
+        fft_forward(plan, in, out);
+        fft_inverse(plan, out, back);
+        for (size_t i = 0; i < 2 * n; i++)
+            TEST_ASSERT_DOUBLE_WITHIN(rounding * 4.0, in[i], back[i] / (double)n);
+    }
+}
+
+static void test_fft_keeps_the_energy(void)
+{
+    for (size_t l = 0; l < length_count; l++) {
+        size_t n = lengths[l];
+        double time = 0.0, frequency = 0.0;
+        plan_for(n);
+        fill(n);
+        fft_forward(plan, in, out);
+        for (size_t i = 0; i < 2 * n; i++) {
+            time += in[i] * in[i];
+            frequency += out[i] * out[i] / (double)n;
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(rounding * time, time, frequency);
+    }
+}
+
+static void test_fft_of_a_late_pulse_turns_by_its_delay(void)
+{
+    const size_t n = 97, delay = 5;
+    plan_for(n);
+    for (size_t i = 0; i < 2 * n; i++)
+        in[i] = i == 2 * delay ? 1.0 : 0.0;
+    fft_forward(plan, in, out);
+    for (size_t k = 0; k < n; k++) {
+        double angle = -two_pi * (double)(k * delay % n) / (double)n;
+        TEST_ASSERT_DOUBLE_WITHIN(rounding, cos(angle), out[2 * k]);
+        TEST_ASSERT_DOUBLE_WITHIN(rounding, sin(angle), out[2 * k + 1]);
+    }
+}
+
+static void test_fft_of_a_cosine_is_two_lines_of_half_its_height(void)
+{
+    const size_t n = 1000, line = 37;
+    const double height = 3.0, phase = 0.4;
+    plan_for(n);
+    for (size_t i = 0; i < n; i++) {
+        in[2 * i] = height * cos(two_pi * (double)(line * i % n) / (double)n + phase);
+        in[2 * i + 1] = 0.0;
+    }
+    fft_forward(plan, in, out);
+    for (size_t k = 0; k < n; k++) {
+        double half = k == line || k == n - line ? 0.5 * height * (double)n : 0.0;
+        double angle = k == line ? phase : -phase;
+        TEST_ASSERT_DOUBLE_WITHIN(rounding * height * (double)n, half * cos(angle), out[2 * k]);
+        TEST_ASSERT_DOUBLE_WITHIN(rounding * height * (double)n, half * sin(angle), out[2 * k + 1]);
+    }
+}
+
+static void test_fft_leaves_its_input(void)
+{
+    plan_for(60);
+    fill(60);
+    for (size_t i = 0; i < 120; i++)
+        back[i] = in[i];
+    fft_forward(plan, in, out);
+    fft_inverse(plan, in, out);
+    TEST_ASSERT_EQUAL_MEMORY(back, in, 120 * sizeof in[0]);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_fft_forward_is_the_defining_sum);
+    RUN_TEST(test_fft_inverse_of_forward_is_the_input_times_the_length);
+    RUN_TEST(test_fft_keeps_the_energy);
+    RUN_TEST(test_fft_of_a_late_pulse_turns_by_its_delay);
+    RUN_TEST(test_fft_of_a_cosine_is_two_lines_of_half_its_height);
+    RUN_TEST(test_fft_leaves_its_input);
+    return UNITY_END();
+}

@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: MIT */
+#include "tools/servoscope/designing.h"
+
+#include "lab/design/report.h"
+#include "lab/page/page.h"
+#include "lab/record/atomic_file.h"
+#include "lab/record/table_file.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/// One period as it was designed, and where in it to begin: the player starts at start_index.
+static int fill_table(const struct design_request *request, const struct design_result *result, struct table *out_table,
+                      struct error *out_error)
+{
+    const uint32_t samples = (uint32_t)result->period_samples;
+    int status = table_alloc(out_table, samples, msgen_channels_max, (uint32_t)result->bin_count, out_error);
+    if (status) {
+        return status;
+    }
+    out_table->rate_num_hz = request->rate_numerator_hz;
+    out_table->rate_den = request->rate_denominator;
+    out_table->start_index = (uint32_t)result->start_index;
+    out_table->linear = request->linear;
+    memcpy(out_table->bins, result->bins, result->bin_count * sizeof *result->bins);
+    memcpy(out_table->torque, result->torque_Nm, samples * sizeof(double));
+    memcpy(out_table->velocity, result->velocity_rad_per_s, samples * sizeof(double));
+    memcpy(out_table->position, result->position_rad, samples * sizeof(double));
+    memcpy(out_table->acceleration, result->acceleration_rad_per_s2, samples * sizeof(double));
+    return 0;
+}
+
+int designing_write(const char *prefix, const struct design_request *request, const struct design_result *result,
+                    struct error *out_error)
+{
+    static const struct {
+        const char *ending;
+        int (*write)(const char *path, struct table *table, struct error *out_error);
+    } files[] = {{".csv", table_file_write_csv}, {".h", table_file_write_header}, {".mst", table_file_write_mst}};
+    struct table table = {0};
+    const size_t path_size = strlen(prefix) + 5;
+    char *path = malloc(path_size);
+    int status = path ? fill_table(request, result, &table, out_error)
+                      : error_set(out_error, error_refused, "memory is short for the file names");
+    for (size_t i = 0; !status && i < sizeof files / sizeof files[0]; i++) {
+        snprintf(path, path_size, "%s%s", prefix, files[i].ending);
+        status = files[i].write(path, &table, out_error);
+    }
+    table_free(&table);
+    free(path);
+    return status;
+}
+
+int designing_report(const char *path, const struct design_request *request, const struct design_result *result,
+                     struct error *out_error)
+{
+    struct atomic_file file;
+    struct page page;
+    FILE *stream = atomic_file_open(&file, path, out_error);
+    if (!stream) {
+        return error_refused;
+    }
+    page_start(&page, stream, "Excitation", NULL);
+    design_report_section(&page, request, result);
+    page_end(&page, NULL);
+    return atomic_file_commit(&file, out_error);
+}

@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: MIT */
+/// What `design` and `demo` have in common: a design as the three files that a drive, a firmware and a person want.
+#ifndef SERVOSCOPE_TOOLS_DESIGNING_H
+#define SERVOSCOPE_TOOLS_DESIGNING_H
+
+#include "lab/design/design.h"
+#include "lab/record/error.h"
+
+/// Writes PREFIX.csv, PREFIX.h and PREFIX.mst, the table last: where it is, the others are.
+/// Errors: error_refused with the path and the reason; files already in place stay whole
+int designing_write(const char *prefix, const struct design_request *request, const struct design_result *result,
+                    struct error *out_error);
+
+/// Writes a page with the design's report section alone.
+/// Errors: error_refused with the path and the reason; `path` is as it was then
+int designing_report(const char *path, const struct design_request *request, const struct design_result *result,
+                     struct error *out_error);
+
+#endif
