@@ -29,7 +29,7 @@ struct sim_sample {
     double torque;          ///< measured motor torque at the sampling instant
     double position;        ///< measured
     double velocity;        ///< measured
-    double load_position;   ///< measured at the load; equals position for a rigid drive
+    double load_position;   ///< measured at the load, by an encoder of its own; rigid: of the motor's position
 };
 
 struct sim_belt_drive {

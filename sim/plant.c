@@ -68,17 +68,45 @@ void sim_plant_init(struct sim_plant *self, double position)
     *self = (struct sim_plant){.position = position, .load_position = position};
 }
 
-void sim_plant_opposing(const struct sim_model *model, const struct sim_motion *motion, struct sim_opposing *out_opposing)
+/// The model as one step sees it: which effects oppose the motion is looked up once, not at every instant.
+struct field {
+    const struct sim_model *model;
+    bool two_mass;
+    double torque;
+    size_t count;
+    size_t effects[sim_effects_max];
+};
+
+static void field_init(struct field *self, const struct sim_model *model, double torque)
+{
+    self->model = model;
+    self->two_mass = model->structure == sim_structure_two_mass;
+    self->torque = torque;
+    self->count = 0;
+    for (size_t e = 0; sim_effects[e]; e++)
+        if (model->effect_on[e] && sim_effects[e]->oppose)
+            self->effects[self->count++] = e;
+}
+
+static void field_opposing(const struct field *self, const struct sim_motion *motion, struct sim_opposing *out_opposing)
 {
     *out_opposing = (struct sim_opposing){
-        .viscous = model->viscous_friction_Nms_per_rad * motion->velocity,
-        .dry = model->coulomb_friction_Nm,
+        .viscous = self->model->viscous_friction_Nms_per_rad * motion->velocity,
+        .dry = self->model->coulomb_friction_Nm,
         .positive_factor = 1.0,
         .negative_factor = 1.0,
     };
-    for (size_t e = 0; sim_effects[e]; e++)
-        if (model->effect_on[e] && sim_effects[e]->oppose)
-            sim_effects[e]->oppose(model->effect_parameters[e], motion, out_opposing);
+    for (size_t i = 0; i < self->count; i++) {
+        size_t e = self->effects[i];
+        sim_effects[e]->oppose(self->model->effect_parameters[e], motion, out_opposing);
+    }
+}
+
+void sim_plant_opposing(const struct sim_model *model, const struct sim_motion *motion, struct sim_opposing *out_opposing)
+{
+    struct field field;
+    field_init(&field, model, 0.0);
+    field_opposing(&field, motion, out_opposing);
 }
 
 struct rates {
@@ -92,31 +120,30 @@ static double belt_torque(const struct sim_plant *p, const struct sim_model *mod
 }
 
 /// Torque left for acceleration and dry friction at the present state, and that friction for motion in `direction`.
-static double driving_torque(const struct sim_plant *p, const struct sim_model *model, double torque, int direction,
-                             double *out_dry)
+static double driving_torque(const struct sim_plant *p, const struct field *field, int direction, double *out_dry)
 {
     struct sim_motion motion = {.position = p->position, .velocity = p->velocity, .time_s = p->time_s,
-                                .linear = model->linear};
+                                .linear = field->model->linear};
     struct sim_opposing o;
-    sim_plant_opposing(model, &motion, &o);
+    field_opposing(field, &motion, &o);
     double factor = direction >= 0 ? o.positive_factor : o.negative_factor;
     *out_dry = factor * o.dry;
-    double belt = model->structure == sim_structure_two_mass ? belt_torque(p, model) : 0.0;
-    return torque - o.smooth - factor * o.viscous - belt;
+    double belt = field->two_mass ? belt_torque(p, field->model) : 0.0;
+    return field->torque - o.smooth - factor * o.viscous - belt;
 }
 
 /// Time derivatives while the motor moves in `direction` (+1, -1) or sticks (0).
-static struct rates plant_rates(const struct sim_plant *p, const struct sim_model *model, double torque, int direction)
+static struct rates plant_rates(const struct sim_plant *p, const struct field *field, int direction)
 {
+    const struct sim_model *model = field->model;
     struct rates r = {.velocity = p->velocity, .load_velocity = p->load_velocity};
-    bool two = model->structure == sim_structure_two_mass;
     if (direction != 0) {
         double dry;
-        double driving = driving_torque(p, model, torque, direction, &dry);
-        double inertia = model->motor_inertia_kgm2 + (two ? 0.0 : model->load_inertia_kgm2);
+        double driving = driving_torque(p, field, direction, &dry);
+        double inertia = model->motor_inertia_kgm2 + (field->two_mass ? 0.0 : model->load_inertia_kgm2);
         r.acceleration = (driving - direction * dry) / inertia;
     }
-    if (two)
+    if (field->two_mass)
         r.load_acceleration = belt_torque(p, model) / model->load_inertia_kgm2;
     else
         r.load_acceleration = r.acceleration;
@@ -135,16 +162,15 @@ static struct sim_plant advanced(const struct sim_plant *p, const struct rates *
 }
 
 /// One classical Runge-Kutta step with the direction of friction held.
-static struct sim_plant runge_kutta(const struct sim_plant *p, const struct sim_model *model, double torque, int direction,
-                                    double dt_s)
+static struct sim_plant runge_kutta(const struct sim_plant *p, const struct field *field, int direction, double dt_s)
 {
-    struct rates a = plant_rates(p, model, torque, direction);
+    struct rates a = plant_rates(p, field, direction);
     struct sim_plant at = advanced(p, &a, dt_s / 2);
-    struct rates b = plant_rates(&at, model, torque, direction);
+    struct rates b = plant_rates(&at, field, direction);
     at = advanced(p, &b, dt_s / 2);
-    struct rates c = plant_rates(&at, model, torque, direction);
+    struct rates c = plant_rates(&at, field, direction);
     at = advanced(p, &c, dt_s);
-    struct rates d = plant_rates(&at, model, torque, direction);
+    struct rates d = plant_rates(&at, field, direction);
     struct rates mean = {
         .velocity = (a.velocity + 2 * b.velocity + 2 * c.velocity + d.velocity) / 6,
         .acceleration = (a.acceleration + 2 * b.acceleration + 2 * c.acceleration + d.acceleration) / 6,
@@ -155,38 +181,61 @@ static struct sim_plant runge_kutta(const struct sim_plant *p, const struct sim_
 }
 
 /// Direction in which a motor at rest sets off, 0 if friction holds it.
-static int breakaway(const struct sim_plant *p, const struct sim_model *model, double torque)
+static int breakaway(const struct sim_plant *p, const struct field *field)
 {
     for (int direction = -1; direction <= 1; direction += 2) {
         double dry;
-        double driving = driving_torque(p, model, torque, direction, &dry);
+        double driving = driving_torque(p, field, direction, &dry);
         if (direction * driving > dry)
             return direction;
     }
     return 0;
 }
 
+/// Time after which the motor comes to rest in a step that ends with it running backward at end_speed. False position: the
+/// straight line alone would drop a speed of the second order of the step, which a belt's changing pull makes felt.
+static double time_to_rest(const struct sim_plant *p, const struct field *field, int direction, double dt_s, double end_speed)
+{
+    enum { refinements = 2 };
+    double low_s = 0.0, low = fabs(p->velocity), high_s = dt_s, high = end_speed, at_s = 0.0;
+    for (int i = 0; i <= refinements; i++) {
+        at_s = low_s + (high_s - low_s) * low / (low + high);
+        if (i == refinements)
+            break;
+        double speed = direction * runge_kutta(p, field, direction, at_s).velocity;
+        if (speed > 0.0) {
+            low_s = at_s;
+            low = speed;
+        } else if (speed < 0.0) {
+            high_s = at_s;
+            high = -speed;
+        } else {
+            break;
+        }
+    }
+    return at_s;
+}
+
 /// A step in which the motor may come to rest: split there, so that its speed is exactly zero while it sticks.
-static void step_with_reversal(struct sim_plant *self, const struct sim_model *model, double torque, double dt_s)
+static void step_with_reversal(struct sim_plant *self, const struct field *field, double dt_s)
 {
     // Each pass either ends the step or brings the motor to rest; after two rests in one step it is held to the end.
     double left_s = dt_s;
     for (int pass = 0; pass < 3 && left_s > 0.0; pass++) {
-        int direction = self->velocity > 0.0 ? 1 : self->velocity < 0.0 ? -1 : breakaway(self, model, torque);
+        int direction = self->velocity > 0.0 ? 1 : self->velocity < 0.0 ? -1 : breakaway(self, field);
         if (pass == 2 && self->velocity == 0.0)
             direction = 0;
-        struct sim_plant next = runge_kutta(self, model, torque, direction, left_s);
+        struct sim_plant next = runge_kutta(self, field, direction, left_s);
         if (direction == 0 || direction * next.velocity >= 0.0) {
             *self = next;
             return;
         }
-        double before = fabs(self->velocity);
-        double part_s = left_s * before / (before + fabs(next.velocity));
-        if (before == 0.0) { // set off and came back within the step: it did not get away
+        double part_s = left_s;
+        if (self->velocity == 0.0) // set off and came back within the step: it did not get away
             direction = 0;
-            part_s = left_s;
-        }
-        *self = runge_kutta(self, model, torque, direction, part_s);
+        else
+            part_s = time_to_rest(self, field, direction, left_s, fabs(next.velocity));
+        *self = runge_kutta(self, field, direction, part_s);
         self->velocity = 0.0;
         left_s -= part_s;
     }
@@ -205,9 +254,11 @@ static size_t inner_steps(const struct sim_model *model, double dt_s)
 
 void sim_plant_step(struct sim_plant *self, const struct sim_model *model, double torque, double dt_s)
 {
+    struct field field;
+    field_init(&field, model, torque);
     size_t steps = inner_steps(model, dt_s);
     for (size_t i = 0; i < steps; i++)
-        step_with_reversal(self, model, torque, dt_s / (double)steps);
+        step_with_reversal(self, &field, dt_s / (double)steps);
     if (model->structure == sim_structure_rigid) {
         self->load_position = self->position;
         self->load_velocity = self->velocity;

@@ -57,18 +57,19 @@ static void add_panel(struct figure *figure, const struct row *row, size_t count
     snprintf(label, sizeof label, "%s in %s", row->name, row->unit);
     struct figure_panel *panel = figure_add_panel(figure, label, axis_linear);
     panel->height = 130;
-    figure_add_line(panel, row->name, count, time_s, series);
+    figure_add_line(panel, row->name, count, time_s, series)->size = 1;
     if (row->limit > 0) {
-        snprintf(label, sizeof label, "limit %.4g", row->limit);
-        figure_add_limit(panel, label, row->limit);
-        figure_add_limit(panel, "", -row->limit);
+        snprintf(label, sizeof label, "limits ±%.4g", row->limit);
+        const enum figure_dash dash = figure_add_limit(panel, label, row->limit)->dash;
+        figure_add_limit(panel, "", -row->limit)->dash = dash;
     }
 }
 
 /// One period in the order of playing, closed by its first sample: `values` holds (row_count + 1) x (N + 1) numbers.
-static void add_period(struct page *page, const struct design_result *result, double step_s, const struct row *rows,
-                       double *values)
+static void add_period(struct page *page, const struct design_request *request, const struct design_result *result,
+                       const struct row *rows, double *values)
 {
+    const double step_s = (double)request->rate_denominator / request->rate_numerator_hz;
     const size_t period = result->period_samples;
     const size_t points = period + 1;
     struct figure figure;
@@ -86,9 +87,10 @@ static void add_period(struct page *page, const struct design_result *result, do
         }
     }
     page_add_figure(page, &figure,
-                    "One period as it is played, from rest: it begins at sample %zu of the table, at a zero crossing of "
-                    "the velocity unless told otherwise.",
-                    result->start_index);
+                    "One period as it is played, from sample %zu of the table on%s.", result->start_index,
+                    request->start == design_start_paper
+                        ? ": the zero crossing of the velocity with the least acceleration, because the axis begins at rest"
+                        : "");
 }
 
 static void add_spectrum(struct page *page, const struct design_request *request, const struct design_result *result,
@@ -179,7 +181,7 @@ void design_report_section(struct page *page, const struct design_request *reque
                        result->peak.torque_Nm, rows[row_torque].unit, result->peak.velocity_rad_per_s,
                        rows[row_velocity].unit);
     if (values) {
-        add_period(page, result, 1 / rate_hz, rows, values);
+        add_period(page, request, result, rows, values);
         add_spectrum(page, request, result, line_hz, rows, values);
     } else {
         page_add_paragraph(page, "Memory was short for the figures of this section.");

@@ -14,7 +14,7 @@ enum {
     filter_taps = 6,
 };
 
-static const size_t group_sizes[blackbox_groups] = {2 * speed_knots, position_knots, direction_knots, 2 * filter_taps + 3};
+static const size_t group_sizes[blackbox_groups] = {2 * speed_knots + 2, position_knots, direction_knots, 2 * filter_taps + 3};
 
 const char *blackbox_group_name(enum blackbox_group group)
 {
@@ -35,6 +35,10 @@ static double hat(double u, size_t knot, size_t count)
 /// Speeds are dense near zero, so knots are: u = sqrt(|v| / peak).
 static double speed_function(const struct recording *r, double v, size_t index)
 {
+    if (index == 2 * speed_knots)
+        return v; // the knots are no straight line, and this function is one that models have
+    if (index == 2 * speed_knots + 1)
+        return v * fabs(v);
     bool negative = index >= speed_knots;
     if ((v < 0.0) != negative)
         return 0.0;
@@ -153,7 +157,7 @@ void blackbox_free(struct blackbox *self)
 }
 
 double blackbox_gain(const struct blackbox *self, const struct fit_data *data, const struct hypothesis *hypothesis,
-                     const struct fit *fit, unsigned mask, double *out_cost)
+                     const struct fit *fit, unsigned mask, double *out_cost, double *out_left)
 {
     size_t rows = data->values, most = self->columns + hypothesis->count, m = hypothesis->count;
     double *A = malloc((rows * most + rows + 3 * most) * sizeof *A);
@@ -190,6 +194,8 @@ double blackbox_gain(const struct blackbox *self, const struct fit_data *data, c
         }
         for (size_t j = 0; j < rows; j++)
             cost += b[j] * b[j];
+        for (size_t j = 0; out_left && j < rows; j++)
+            out_left[j] = -b[j];
     }
     free(A);
     if (out_cost)

@@ -6,6 +6,9 @@
 
 #include "lab/diagnose/fit.h"
 
+/// Masks have one bit per group.
+enum { blackbox_all = 15 };
+
 enum blackbox_group {
     blackbox_speed,     ///< functions of speed, each direction on its own
     blackbox_position,  ///< functions of position
@@ -25,9 +28,10 @@ bool blackbox_init(struct blackbox *self, const struct fit_data *data);
 void blackbox_free(struct blackbox *self);
 
 /// Gain in nats of letting the groups in `mask` (bit per group) and the hypothesis' own parameters move, over the fit as it is.
-/// out_cost: the cost that is left, NULL: not wanted. Errors: 0 and the old cost if memory is short.
+/// out_cost: the cost that is left; out_left: the whitened residual that is left, data->values; NULL: not wanted.
+/// Errors: 0 and the old cost if memory is short.
 double blackbox_gain(const struct blackbox *self, const struct fit_data *data, const struct hypothesis *hypothesis,
-                     const struct fit *fit, unsigned mask, double *out_cost);
+                     const struct fit *fit, unsigned mask, double *out_cost, double *out_left);
 
 const char *blackbox_group_name(enum blackbox_group group);
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/diagnose/diagnosis.h"
 
+#include "lab/diagnose/blackbox.h"
 #include "lab/diagnose/judge.h"
 #include "lab/diagnose/recording.h"
 #include "lab/diagnose/search.h"
@@ -154,13 +155,56 @@ static bool estimate_noise(struct evidence *evidence, size_t count, const struct
 {
     bool good = true;
     for (size_t i = 0; i < count; i++)
-        good = evidence_estimate_noise(&evidence[i], model, NULL) && good;
+        good = evidence_estimate_noise(&evidence[i], model) && good;
     return good;
 }
 
 static bool tell(const struct diagnosis_request *request, const char *what)
 {
     return !request->progress || request->progress(request->user, what);
+}
+
+/// Without periods the residual itself is all there is to take the noise from. What a black box can explain of it is taken out
+/// first, or friction that the model lacks would pass for noise and never be worth a name.
+static bool sharpen_noise(struct evidence *evidence, const struct fit_data *data, struct fit *fit, struct hypothesis *h,
+                          size_t iterations)
+{
+    for (size_t pass = 0; !evidence[0].recording->periodic && pass < 3; pass++) {
+        struct blackbox box;
+        double *left = malloc(data->values * sizeof *left);
+        bool good = left && fit_run(fit, data, h, iterations) && blackbox_init(&box, data);
+        if (good) {
+            memcpy(left, fit->residual, data->values * sizeof *left);
+            blackbox_gain(&box, data, h, fit, blackbox_all, NULL, left);
+            const double *part = left;
+            for (size_t i = 0; good && i < data->runs; i++) {
+                good = evidence_sharpen_noise(&evidence[i], part);
+                part += evidence[i].values;
+            }
+            blackbox_free(&box);
+        }
+        free(left);
+        if (!good)
+            return false;
+    }
+    return true;
+}
+
+/// The noise of the validation runs under the extended model, which is not fitted to them.
+static bool estimate_validation_noise(struct work *w, const struct hypothesis *h, const struct sim_model *extended)
+{
+    struct fit fit;
+    struct hypothesis fixed = *h;
+    if (!estimate_noise(w->evidence + w->fit_count, w->validate_count, extended) || !fit_init(&fit, &w->validate_data))
+        return false;
+    bool good = sharpen_noise(w->evidence + w->fit_count, &w->validate_data, &fit, &fixed, 0);
+    fit_free(&fit);
+    return good;
+}
+
+static bool same_names(const struct hypothesis *a, const struct hypothesis *b)
+{
+    return memcmp(a->named, b->named, sizeof a->named) == 0;
 }
 
 /// Refits the given structure, then searches; the noise is estimated anew under every better model, because a wrong model's
@@ -170,17 +214,21 @@ static bool find_causes(const struct diagnosis_request *request, struct work *w,
     struct sim_model model = d->given;
     hypothesis_init(h, &d->given, !d->model_given, w->recordings[0].block.torque_ref != NULL);
     for (int pass = 0; pass < 2; pass++) {
-        if (!estimate_noise(w->evidence, w->fit_count, &model) || !fit_run(&w->fit, &w->fit_data, h, refit_iterations))
+        if (!estimate_noise(w->evidence, w->fit_count, &model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
+            !fit_run(&w->fit, &w->fit_data, h, refit_iterations))
             return false;
         hypothesis_model(h, NULL, &model);
     }
     d->refitted_model = model;
-    struct search_options options = {.causes_max = 5, .progress = request->progress, .user = request->user};
-    for (int pass = 0; pass < 3; pass++) {
-        if (!estimate_noise(w->evidence, w->fit_count, &model) ||
+    struct search_options options = {.causes_max = 6, .progress = request->progress, .user = request->user};
+    for (int pass = 0; pass < 4; pass++) {
+        struct hypothesis before = *h;
+        if (!estimate_noise(w->evidence, w->fit_count, &model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
             !search_run(&w->fit_data, &w->recordings[0].coverage, &options, h, &w->fit))
             return false;
         hypothesis_model(h, NULL, &model);
+        if (same_names(&before, h))
+            break;
     }
     d->extended_model = model;
     d->fit_misfit = w->fit.cost / (double)w->fit_data.values;
@@ -270,7 +318,7 @@ static void name_runs(const struct diagnosis_request *request, struct diagnosis 
 static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesis *h)
 {
     // The noise of the validation data under the extended model; one set of weights for all three models.
-    if (!estimate_noise(w->evidence + w->fit_count, w->validate_count, &d->extended_model))
+    if (!estimate_validation_noise(w, h, &d->extended_model))
         return false;
     d->nominal = validate_figures(&w->validate_data, &d->given);
     d->refitted = validate_figures(&w->validate_data, &d->refitted_model);
@@ -289,7 +337,8 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
         snprintf(d->where, sizeof d->where, "%s", judgement.where);
         d->unexplained_share = fmin(fmax((pow(d->extended.whitened_rms, 2.0) - 1.0) /
                                              fmax(pow(d->nominal.whitened_rms, 2.0) - 1.0, 1e-12), 0.0), 1.0);
-    } else {
+    }
+    if (h->inertia_free || !judgement.unexplained) {
         d->tie_count = judge_ties(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, d->ties, diagnosis_ties_max);
     }
     return validate_curves(&w->validate_data, d, &d->curves);

@@ -129,6 +129,7 @@ static void name_parameter(struct hypothesis *self, int effect, size_t i, const 
     bool linear = self->given->linear;
     double low = linear ? p->linear_minimum : p->minimum, high = linear ? p->linear_maximum : p->maximum;
     struct coordinate c = {.effect = effect, .parameter = i, .model_offset = p->model_offset, .unit = 1.0};
+    const double widest = 3.4; // thirtyfold either way of where the search starts: far enough, and the plant stays solvable
     double x = 1.0;
     switch (p->kind) {
     case sim_parameter_linear:
@@ -142,8 +143,8 @@ static void name_parameter(struct hypothesis *self, int effect, size_t i, const 
         c.scale = coordinate_logarithmic;
         c.unit = values[i];
         x = 0.0;
-        c.lower = log(low / c.unit);
-        c.upper = log(high / c.unit);
+        c.lower = fmax(log(low / c.unit), -widest);
+        c.upper = fmin(log(high / c.unit), widest);
         break;
     case sim_parameter_amplitude:
         c.scale = coordinate_cosine;

@@ -45,13 +45,12 @@ static double evidence_beside(const struct blackbox *box, const struct fit_data 
     struct fit trial;
     struct hypothesis without = *h;
     double with_cost, without_cost = 0.0;
-    const unsigned all = (1u << blackbox_groups) - 1u;
     if (!fit_init(&trial, data))
         return 0.0;
-    blackbox_gain(box, data, h, fit, all, &with_cost);
+    blackbox_gain(box, data, h, fit, blackbox_all, &with_cost, NULL);
     hypothesis_unname(&without, effect);
     if (fit_run(&trial, data, &without, trial_iterations))
-        blackbox_gain(box, data, &without, &trial, all, &without_cost);
+        blackbox_gain(box, data, &without, &trial, blackbox_all, &without_cost, NULL);
     fit_free(&trial);
     return 0.5 * (without_cost - with_cost);
 }
@@ -77,7 +76,7 @@ static void describe_rest(const struct blackbox *box, const struct fit_data *dat
     double gains[blackbox_groups];
     int best = 0;
     for (int g = 0; g < blackbox_groups; g++) {
-        gains[g] = blackbox_gain(box, data, h, fit, 1u << g, NULL);
+        gains[g] = blackbox_gain(box, data, h, fit, 1u << g, NULL, NULL);
         if (gains[g] > gains[best])
             best = g;
     }
@@ -90,14 +89,18 @@ static void judge_names(const struct blackbox *box, const struct fit_data *data,
                         const struct hypothesis *h, const struct fit *fit, struct judgement *j)
 {
     const double least_share = 0.004; // of the torque's RMS: less is not worth a name even if it is significant
-    const double dominance = 1000.0;  // of a cause over what stays unexplained
+    // How far a cause has to outweigh what stays unexplained. Beside a given model a name says what changed, and a term of the
+    // wrong shape gains a hundred times what it leaves. Without a model it says what is there at all.
+    const double dominance = h->inertia_free ? 5.0 : 1000.0;
     for (int e = 0; sim_effects[e]; e++) {
         if (!h->named[e])
             continue;
         bool stands = effect_share(data, coverage, h, e) >= least_share;
-        if (stands && j->unexplained)
-            stands = search_evidence(data, h, fit, e) > dominance * j->leftover ||
-                     evidence_beside(box, data, h, fit, e) > fmax(search_threshold(data, e), 0.1 * j->leftover);
+        if (stands && j->unexplained) {
+            double evidence = search_evidence(data, h, fit, e);
+            stands = evidence > dominance * j->leftover ||
+                     evidence_beside(box, data, h, fit, e) > fmax(0.05 * evidence, 0.1 * j->leftover);
+        }
         j->stands[e] = stands;
         j->count += stands;
     }
@@ -112,7 +115,7 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
     if (!blackbox_init(&box, data))
         return false;
     double left;
-    j->leftover = blackbox_gain(&box, data, hypothesis, fit, (1u << blackbox_groups) - 1u, &left);
+    j->leftover = blackbox_gain(&box, data, hypothesis, fit, blackbox_all, &left, NULL);
     double scale = fmax(left / (double)data->values, 1.0);
     double chance = 0.5 * (double)box.columns + 12.0 * sqrt(0.5 * (double)box.columns);
     const double half_again = 1.5;
@@ -125,20 +128,17 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
     return true;
 }
 
-/// Cost of the hypothesis with one named effect replaced by another; infinity if that cannot be tried.
-static double cost_of_swap(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *h,
-                           int out, int in)
+/// Whether another effect does as well as the one that was taken out of a hypothesis (`without`, fitted).
+static bool replaces(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *without,
+                     const struct fit *without_fit, int in, double most_cost)
 {
     struct fit trial;
-    struct hypothesis swapped = *h;
-    hypothesis_unname(&swapped, out);
-    if (!hypothesis_may_name(&swapped, in) || !fit_init(&trial, data))
-        return INFINITY;
-    double cost = INFINITY;
-    if (fit_run(&trial, data, &swapped, trial_iterations) && search_add(data, coverage, in, &swapped, &trial))
-        cost = trial.cost;
+    struct hypothesis swapped = *without;
+    if (!hypothesis_may_name(without, in) || !fit_init(&trial, data))
+        return false;
+    bool good = search_add(data, coverage, in, without_fit, most_cost, &swapped, &trial) && trial.cost < most_cost;
     fit_free(&trial);
-    return cost;
+    return good;
 }
 
 size_t judge_ties(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,
@@ -146,15 +146,20 @@ size_t judge_ties(const struct fit_data *data, const struct sim_coverage *covera
 {
     const double apart_nats = 6.0;
     double misfit = fmax(fit->cost / (double)data->values, 1.0);
+    double most_cost = fit->cost + 2.0 * apart_nats * misfit;
     size_t count = 0;
+    struct fit without_fit;
+    if (!fit_init(&without_fit, data))
+        return 0;
     for (int out = 0; sim_effects[out]; out++) {
+        struct hypothesis without = *hypothesis;
         if (!hypothesis->named[out])
             continue;
+        hypothesis_unname(&without, out);
+        if (!fit_run(&without_fit, data, &without, trial_iterations))
+            continue;
         for (int in = 0; sim_effects[in] && count < most; in++) {
-            if (hypothesis->named[in])
-                continue;
-            double cost = cost_of_swap(data, coverage, hypothesis, out, in);
-            if (!(0.5 * (cost - fit->cost) / misfit < apart_nats))
+            if (hypothesis->named[in] || !replaces(data, coverage, &without, &without_fit, in, most_cost))
                 continue;
             struct diagnosis_tie *t = &out_ties[count++];
             t->effects[0] = out;
@@ -162,5 +167,6 @@ size_t judge_ties(const struct fit_data *data, const struct sim_coverage *covera
             snprintf(t->next, sizeof t->next, "measure %s", sim_effects[out]->measure);
         }
     }
+    fit_free(&without_fit);
     return count;
 }

@@ -155,7 +155,7 @@ static bool noise_from_periods(const struct evidence *self, const struct sim_mod
     return good;
 }
 
-static bool noise_from_residual(const struct evidence *self, const struct sim_model *model, const double *removed, double *raw)
+static bool noise_from_residual(const struct evidence *self, const struct sim_model *model, double *raw)
 {
     const struct recording *r = self->recording;
     size_t n = r->block.samples, bins = r->band + 1;
@@ -163,8 +163,6 @@ static bool noise_from_residual(const struct evidence *self, const struct sim_mo
     if (!both)
         return false;
     predict(model, &r->block, false, self->scale_inertia, both, both + n);
-    for (size_t i = 0; removed && i < n; i++)
-        both[i] -= removed[i];
     double *m = both + 2 * n;
     evidence_transform(self, both, m);
     evidence_transform(self, both + n, m + 2 * bins);
@@ -174,17 +172,42 @@ static bool noise_from_residual(const struct evidence *self, const struct sim_mo
     return true;
 }
 
-bool evidence_estimate_noise(struct evidence *self, const struct sim_model *model, const double *removed)
+bool evidence_estimate_noise(struct evidence *self, const struct sim_model *model)
 {
     double *raw = calloc(4 * (self->recording->band + 1), sizeof *raw);
     bool good = raw && (self->recording->periodic ? noise_from_periods(self, model, raw)
-                                                  : noise_from_residual(self, model, removed, raw));
+                                                  : noise_from_residual(self, model, raw));
     if (good) {
         smooth(self, raw);
         factorise(self);
     }
     free(raw);
     return good;
+}
+
+bool evidence_sharpen_noise(struct evidence *self, const double *whitened)
+{
+    if (self->recording->periodic)
+        return true;
+    size_t bins = self->recording->band + 1;
+    double *raw = calloc(4 * bins, sizeof *raw);
+    if (!raw)
+        return false;
+    const double *w = whitened + 1; // bin 0 borrows from its neighbours
+    for (size_t k = 1; k < bins; k++) {
+        const double *f = self->factor + 4 * k;
+        double m[2] = {w[0] / f[0], w[1] / f[0]}, a[2] = {0.0, 0.0};
+        if (self->channels == 2) {
+            a[0] = (w[2] - f[2] * m[0] + f[3] * m[1]) / f[1];
+            a[1] = (w[3] - f[2] * m[1] - f[3] * m[0]) / f[1];
+        }
+        accumulate(raw + 4 * k, m, self->channels == 2 ? a : NULL, 1.0);
+        w += 2 * self->channels;
+    }
+    smooth(self, raw);
+    factorise(self);
+    free(raw);
+    return true;
 }
 
 void evidence_whiten(const struct evidence *self, const double *mechanics, const double *actuator, double *out_whitened)

@@ -25,11 +25,14 @@ bool evidence_init(struct evidence *self, const struct recording *recording, dou
 void evidence_free(struct evidence *self);
 
 /// Estimates the noise under a model: from the scatter of the periods' residuals about their mean, averaged over neighbouring
-/// bins; in a run without periods from the smoothed spectrum of the residual itself, `removed` subtracted from it first
-/// (mechanics, block length; NULL: nothing), so that it is then an upper bound.
+/// bins; in a run without periods from the smoothed spectrum of the residual itself, an upper bound.
 /// Equation:  C_k = 1 / (P (P-1)) sum_p (R_p - mean) (R_p - mean)^H, smoothed;  R = DFT / N
 /// Errors: false if memory is short.
-bool evidence_estimate_noise(struct evidence *self, const struct sim_model *model, const double *removed);
+bool evidence_estimate_noise(struct evidence *self, const struct sim_model *model);
+
+/// In a run without periods: the noise from a whitened residual (by the present noise) out of which everything that a black box
+/// can explain has been taken. Nothing is done for periodic runs. Errors: false if memory is short.
+bool evidence_sharpen_noise(struct evidence *self, const double *whitened);
 
 /// Residual of a model on the block, whitened: independent, unit variance if the model is right.
 /// Shapes: out_whitened: self->values; order: bin by bin, mechanics before actuator, real before imaginary.

@@ -19,7 +19,7 @@ static double measured_torque(const struct predictor *p, size_t n, size_t i)
     const double *torque = p->stretch->torque;
     size_t last = p->stretch->samples - 1;
     size_t next = n < last ? n + 1 : p->cyclic ? 0 : last;
-    double part = ((double)i + 0.5) / sim_substeps;
+    double part = ((double)i + 0.5) / (double)p->stretch->substeps;
     return torque[n] + part * (torque[next] - torque[n]);
 }
 
@@ -34,9 +34,9 @@ static double predict_sample(struct predictor *p, size_t n)
     }
     p->plant.position = s->position[n];
     p->plant.velocity = s->velocity[n];
-    for (size_t i = 0; i < sim_substeps; i++) {
+    for (size_t i = 0; i < s->substeps; i++) {
         double torque = s->torque_ref ? sim_actuator_substep(&p->actuator, p->model, i) : measured_torque(p, n, i);
-        sim_plant_step(&p->plant, p->model, torque, 1.0 / (p->model->sample_rate_hz * sim_substeps));
+        sim_plant_step(&p->plant, p->model, torque, 1.0 / (p->model->sample_rate_hz * (double)s->substeps));
     }
     return now;
 }

@@ -3,6 +3,7 @@
 
 #include "lab/diagnose/motion.h"
 #include "lab/numeric/fft.h"
+#include "sim/plant.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -183,6 +184,13 @@ static void choose_band(struct recording *r)
     r->band = (size_t)fmin(1.5 * (double)highest, most);
 }
 
+/// Held references change within a sample; measured torque that is slow against the sampling rate does not.
+static void choose_substeps(struct recording *r)
+{
+    bool slow = !r->block.torque_ref && 20 * r->band < r->block.samples;
+    r->block.substeps = r->all.substeps = slow ? 1 : sim_substeps;
+}
+
 static void measure_coverage(struct recording *r)
 {
     const struct stretch *b = &r->block;
@@ -225,6 +233,7 @@ int recording_prepare(const struct run *run, struct recording *out_recording, st
         status = error_set(out_error, error_refused, "%s: the torque is constant: nothing was excited", run->path);
     if (status == 0) {
         choose_band(r);
+        choose_substeps(r);
         measure_coverage(r);
         if (!(r->coverage.velocity_rms > 0.0 && r->coverage.position_span > 0.0))
             status = error_set(out_error, error_refused, "%s: the axis does not move", run->path);

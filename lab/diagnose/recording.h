@@ -15,6 +15,7 @@
 /// One stretch of samples. Torques in Nm or N, motion in rad or m.
 struct stretch {
     size_t samples;
+    size_t substeps;    ///< steps of the simulation per sample: more where torque changes within one
     double *torque_ref; ///< NULL: the run has none; then the measured torque drives the model
     double *torque;
     double *position;

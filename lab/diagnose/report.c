@@ -28,6 +28,12 @@ static void with_signs(const char *text, char out_text[wording_size])
     out_text[used] = '\0';
 }
 
+/// What the last of the models is called: where nothing was found it is the refitted one.
+static const char *best_model(const struct diagnosis *self)
+{
+    return wording_is_extended(self) ? "extended" : "refitted";
+}
+
 static void add_verdict(struct page *page, const struct diagnosis *self)
 {
     char headline[wording_size], gain[wording_size], removed_text[wording_short], sentence[wording_size] = "";
@@ -100,11 +106,12 @@ static void add_excess(struct page *page, const struct diagnosis *self)
     struct report_excess before = report_excess_find(c, c->nominal_Nm), after = report_excess_find(c, c->extended_Nm);
     page_add_paragraph(
         page,
-        "The given model's error is larger than noise explains (two standard deviations) at %zu of %zu lines, most of "
-        "all "
-        "at %.4g Hz, by a factor of %.3g. The extended model's is at %zu lines, most of all at %.4g Hz, by a factor of "
-        "%.3g. Of a perfect model's lines about 2 in 100 would be above by chance: %.0f here.",
-        before.above, before.bins, before.worst_hz, before.worst, after.above, after.worst_hz, after.worst,
+        "The given model's error is larger than noise explains (two standard deviations) at %zu of %zu lines, worst at "
+        "%.4g Hz, by a factor of %.3g; the %s model's at %zu of them, worst at %.4g Hz, by a factor of %.3g. Of a "
+        "perfect "
+        "model's lines about 2 in 100 would be above by chance, %.0f here.",
+        before.above, before.bins, before.worst_hz, before.worst, best_model(self), after.above, after.worst_hz,
+        after.worst,
         exp(-4.0) * (double)after.bins); // |z|^2 of a circular complex Gaussian is exponential: P(|z| > 2 sigma) = e^-4
 }
 
@@ -127,8 +134,10 @@ static void add_spectrum(struct page *page, const struct diagnosis *self)
     panel->height = 230;
     figure_add_points(panel, "model as given", bands.count, bands.frequency_hz, bands.nominal)->colour =
         figure_vermilion;
-    figure_add_points(panel, "refitted", bands.count, bands.frequency_hz, bands.refitted)->colour = figure_orange;
-    figure_add_points(panel, "extended", bands.count, bands.frequency_hz, bands.extended)->colour = figure_green;
+    if (wording_is_extended(self)) {
+        figure_add_points(panel, "refitted", bands.count, bands.frequency_hz, bands.refitted)->colour = figure_orange;
+    }
+    figure_add_points(panel, best_model(self), bands.count, bands.frequency_hz, bands.extended)->colour = figure_green;
     figure_add_limit(panel, "what noise explains", 1.0);
     char grouping[80] = "one point per line";
     if (bands.widest > 1) {
@@ -151,7 +160,7 @@ static void add_error_panel(struct figure *figure, const struct diagnosis *self,
     before->colour = figure_vermilion;
     before->dash = figure_solid;
     struct figure_series *after =
-        figure_add_line(panel, "extended", count, c->time_s + from, c->residual_extended + from);
+        figure_add_line(panel, best_model(self), count, c->time_s + from, c->residual_extended + from);
     after->colour = figure_green;
     after->dash = figure_solid;
 }
@@ -178,9 +187,9 @@ static void add_time(struct page *page, const struct diagnosis *self)
     add_error_panel(&figure, self, 0, c->samples);
     page_add_figure(page, &figure,
                     "%s that each model lacks over time, in the band looked at: %.3g %s RMS as given, %.3g %s "
-                    "extended.",
+                    "%s.",
                     self->linear ? "Force" : "Torque", report_rms(c->residual_nominal, c->samples), units.torque_unit,
-                    report_rms(c->residual_extended, c->samples), units.torque_unit);
+                    report_rms(c->residual_extended, c->samples), units.torque_unit, best_model(self));
 
     size_t width = zoom_width(c->samples), from = report_worst_stretch(c, width);
     char label[figure_text_max];
@@ -232,14 +241,20 @@ static void add_cause_list(struct page *page, const struct diagnosis *self, cons
     page_end_table(page);
 }
 
+static const char *why_no_cause(const struct diagnosis *self)
+{
+    if (self->verdict != diagnosis_no_discrepancy) {
+        return "None stands: whatever was tried, a function without a name explains the data better.";
+    }
+    return self->candidate_count > 0 ? "None is large enough to be claimed."
+                                     : "None is needed: no known cause earns more than its parameters would by chance.";
+}
+
 static void add_causes(struct page *page, const struct diagnosis *self)
 {
     page_add_section(page, self->cause_count == 1 ? "The cause" : "The causes");
     if (self->cause_count == 0) {
-        page_add_paragraph(
-            page, self->verdict == diagnosis_no_discrepancy
-                      ? "None is needed: no known cause earns more than its parameters would by chance."
-                      : "None stands: whatever was tried, a function without a name explains the data better.");
+        page_add_paragraph(page, "%s", why_no_cause(self));
     } else {
         add_cause_list(
             page, self, self->causes, self->cause_count,
@@ -249,7 +264,9 @@ static void add_causes(struct page *page, const struct diagnosis *self)
     if (self->candidate_count > 0) {
         page_add_subsection(page, "What might be, without being claimed");
         add_cause_list(page, self, self->candidates, self->candidate_count,
-                       "Candidates: they lower the error, but do not stand where a black box may explain the rest.");
+                       self->verdict == diagnosis_unexplained
+                           ? "They lower the error, but do not stand where a black box may explain the rest."
+                           : "They lower the error by more than chance would, but by too little to be claimed.");
     }
 }
 
@@ -280,12 +297,12 @@ static void add_friction(struct page *page, const struct diagnosis *self)
     given->colour = figure_vermilion;
     given->dash = figure_dashed;
     struct figure_series *extended =
-        figure_add_line(panel, "extended", c->curve_points, c->curve_velocity, c->curve_extended);
+        figure_add_line(panel, best_model(self), c->curve_points, c->curve_velocity, c->curve_extended);
     extended->colour = figure_ink;
     extended->dash = figure_solid;
     if (isfinite(friction->spread)) {
-        snprintf(spread, sizeof spread, " They scatter about the extended model's curve by %.3g %s RMS.",
-                 friction->spread, units.torque_unit);
+        snprintf(spread, sizeof spread, " They scatter about the %s model's curve by %.3g %s RMS, standstill apart.",
+                 best_model(self), friction->spread, units.torque_unit);
     }
     page_add_section(page, "Friction against speed");
     page_add_figure(page, &figure,
@@ -316,10 +333,11 @@ static void add_gain(struct page *page, const struct diagnosis *self)
     struct figure figure;
     figure_start(&figure, "", axis_linear);
     figure.legend = figure_legend_below;
-    figure_set_categories(&figure, 3, names);
+    size_t models = wording_is_extended(self) ? 3 : 2;
+    figure_set_categories(&figure, models, names);
     struct figure_panel *panel = figure_add_panel(&figure, label, axis_linear);
     panel->from_zero = true;
-    figure_add_bars(panel, "on data the fit has not seen", 3, NULL, percent)->colour = figure_blue;
+    figure_add_bars(panel, "on data the fit has not seen", models, NULL, percent)->colour = figure_blue;
     if (isfinite(self->noise_floor_nrmse)) {
         figure_add_limit(panel, "noise floor", 100.0 * self->noise_floor_nrmse);
     }
@@ -331,18 +349,21 @@ static void add_gain(struct page *page, const struct diagnosis *self)
                     "of the measured %s. A perfect model would be at the noise floor, %s.",
                     units.torque, units.torque, noise);
     page_start_table(page,
-                     "Refitted: the given structure, its own numbers moved by a few percent. One-step errors: RMS over "
+                     "Refitted: the given structure, its own numbers moved within what such numbers are usually off "
+                     "by. One-step errors: RMS over "
                      "their expected standard deviation, 1 for a perfect model.",
                      "lrr", heads);
     add_figures_row(page, names[0], self->nominal);
     add_figures_row(page, names[1], self->refitted);
-    add_figures_row(page, names[2], self->extended);
+    if (models == 3) {
+        add_figures_row(page, names[2], self->extended);
+    }
     page_end_table(page);
 }
 
 static void add_untestable(struct page *page, const struct diagnosis *self)
 {
-    static const char *const heads[] = {"cause", "why not", "would show"};
+    static const char *const heads[] = {"cause", "why not", "what to measure"};
     page_add_section(page, "What these recordings cannot tell");
     if (self->untestable_count == 0) {
         page_add_paragraph(page, "Every cause that is known would have shown.");
@@ -363,7 +384,7 @@ static void add_next(struct page *page, const struct diagnosis *self)
     char(*sentences)[wording_size] = malloc(sentences_max * sizeof *sentences);
     size_t count = sentences ? wording_next(self, sentences_max, sentences) : 0;
     page_add_section(page, "Ties, and what to measure next");
-    if (self->tie_count == 0) {
+    if (self->tie_count == 0 && self->verdict != diagnosis_unexplained) {
         page_add_paragraph(page, "No two causes explain these recordings equally well.");
     }
     if (count > 0) {
@@ -389,9 +410,9 @@ static void add_rest(struct page *page, const struct diagnosis *self)
     }
     if (isfinite(self->fit_misfit) && isfinite(self->extended.whitened_rms)) {
         page_add_paragraph(page,
-                           "On the fitted runs the extended model's mean squared error is %.3g times what the noise "
-                           "explains; on unseen data its one-step errors are %.3g times what was expected.",
-                           self->fit_misfit, self->extended.whitened_rms);
+                           "On the fitted runs the %s model's mean squared error is %.2f times what the noise "
+                           "explains; on unseen data its one-step errors are %.2f times what was expected.",
+                           best_model(self), self->fit_misfit, self->extended.whitened_rms);
     }
 }
 

@@ -108,12 +108,13 @@ size_t report_worst_stretch(const struct diagnosis_curves *curves, size_t width)
     return best;
 }
 
-/// Value of the extended model's friction curve at a speed, NaN outside it; speeds ascend.
+/// Value of the extended model's friction curve at a speed, NaN outside it and in the jump at standstill; speeds ascend.
 static double curve_at(const struct diagnosis_curves *c, double velocity)
 {
     for (size_t i = 1; i < c->curve_points; i++) {
         double from = c->curve_velocity[i - 1], to = c->curve_velocity[i];
-        if (velocity >= from && velocity <= to && to > from) {
+        bool jump = from <= 0.0 && to >= 0.0;
+        if (velocity >= from && velocity <= to && to > from && !jump) {
             double share = (velocity - from) / (to - from);
             return c->curve_extended[i - 1] + share * (c->curve_extended[i] - c->curve_extended[i - 1]);
         }

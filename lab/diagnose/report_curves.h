@@ -38,7 +38,7 @@ size_t report_worst_stretch(const struct diagnosis_curves *curves, size_t width)
 struct report_friction {
     size_t count;
     double velocity[report_points_max], torque[report_points_max];
-    double spread; ///< RMS of the measured points about the extended model's curve; NaN without a curve
+    double spread; ///< RMS of the measured points about the extended model's curve, standstill apart; NaN without one
 };
 
 void report_friction_find(const struct diagnosis_curves *curves, struct report_friction *out_friction);

@@ -207,19 +207,16 @@ static bool add_best(const struct fit_data *data, const struct sim_coverage *cov
     return best > 0.0;
 }
 
-bool search_add(const struct fit_data *data, const struct sim_coverage *coverage, int effect, struct hypothesis *io_hypothesis,
-                struct fit *io_fit)
+bool search_add(const struct fit_data *data, const struct sim_coverage *coverage, int effect, const struct fit *fit,
+                double hoped_cost, struct hypothesis *io_hypothesis, struct fit *out_fit)
 {
     struct candidate candidate;
-    struct fit scratch;
-    if (!fit_init(&scratch, data))
-        return false;
-    bool found = scan_effect(&scratch, data, coverage, io_hypothesis, io_fit, effect, &candidate);
-    fit_free(&scratch);
-    if (!found)
+    const double near = 100.0; // a first step that closes neither half of the gap nor comes this close will not make it
+    bool found = scan_effect(out_fit, data, coverage, io_hypothesis, fit, effect, &candidate);
+    if (!found || candidate.cost > hoped_cost + fmax(0.5 * (fit->cost - hoped_cost), near))
         return false;
     *io_hypothesis = candidate.hypothesis;
-    return fit_run(io_fit, data, io_hypothesis, refine_iterations);
+    return fit_run(out_fit, data, io_hypothesis, refine_iterations);
 }
 
 double search_evidence(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit, int effect)

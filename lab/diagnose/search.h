@@ -19,10 +19,11 @@ struct search_options {
 bool search_run(const struct fit_data *data, const struct sim_coverage *coverage, const struct search_options *options,
                 struct hypothesis *io_hypothesis, struct fit *io_fit);
 
-/// Names one effect on top of a fitted hypothesis, from its best scan value, and refits. On return io_fit belongs to the new
-/// hypothesis. Errors: false if no scan value leads anywhere or memory is short; both unchanged then.
-bool search_add(const struct fit_data *data, const struct sim_coverage *coverage, int effect, struct hypothesis *io_hypothesis,
-                struct fit *io_fit);
+/// Names one effect on top of a fitted hypothesis (`fit` belongs to it), from its best scan value, and refits. It is not
+/// refitted if the first step gets nowhere near `hoped_cost`. On return out_fit belongs to the new hypothesis.
+/// Errors: false if no scan value leads anywhere or memory is short; hypothesis unchanged then.
+bool search_add(const struct fit_data *data, const struct sim_coverage *coverage, int effect, const struct fit *fit,
+                double hoped_cost, struct hypothesis *io_hypothesis, struct fit *out_fit);
 
 /// Gain of one named effect, in nats of log likelihood: what the fit loses without it, everything else refitted.
 /// Errors: negative infinity if memory is short.

@@ -52,7 +52,7 @@ void wording_estimate(double value, double deviation, char out_text[2 * wording_
     } else if (!isfinite(deviation)) {
         snprintf(out_text, size, "%.4g ± unknown", value);
     } else if (!(deviation > 0.0)) {
-        snprintf(out_text, size, "%.6g (exact)", value);
+        snprintf(out_text, size, "%.6g ± 0", value); // chosen, or held at its bound
     } else {
         // Two digits of the deviation, and as many places of the value.
         int places = 1 - (int)floor(log10(deviation));
@@ -63,6 +63,13 @@ void wording_estimate(double value, double deviation, char out_text[2 * wording_
             snprintf(out_text, size, "%.4g ± %.2g", value, deviation);
         }
     }
+}
+
+/// Whether the given numbers, moved within what such numbers are usually off by, fit visibly better.
+static bool refit_matters(const struct diagnosis *self)
+{
+    const double visibly = 1.1;
+    return self->nominal.whitened_rms > visibly * self->refitted.whitened_rms;
 }
 
 void wording_headline(const struct diagnosis *self, char out_text[wording_size])
@@ -85,7 +92,13 @@ void wording_headline(const struct diagnosis *self, char out_text[wording_size])
     case diagnosis_no_discrepancy:
         break;
     }
-    snprintf(out_text, wording_size, "No discrepancy: the model fits within what the noise allows");
+    snprintf(out_text, wording_size, "No discrepancy: %s the model fits within what the noise allows",
+             refit_matters(self) ? "with its own numbers refitted" : "as given");
+}
+
+bool wording_is_extended(const struct diagnosis *self)
+{
+    return self->cause_count + self->candidate_count > 0;
 }
 
 void wording_gain(const struct diagnosis *self, char out_text[wording_size])
@@ -96,10 +109,10 @@ void wording_gain(const struct diagnosis *self, char out_text[wording_size])
     wording_percent(self->refitted.validation_nrmse, refitted);
     wording_percent(self->extended.validation_nrmse, extended);
     wording_percent(self->noise_floor_nrmse, noise);
-    size_t found = self->cause_count + self->candidate_count; // the extended model has both
-    const char *what = self->candidate_count > 0 ? "what was found" : found > 1 ? "the causes" : "the cause";
+    const char *causes = self->cause_count > 1 ? "the causes" : "the cause";
+    const char *what = self->candidate_count > 0 ? "what was found" : causes; // the extended model has both
     char with_causes[2 * wording_short] = "";
-    if (found > 0) {
+    if (wording_is_extended(self)) {
         snprintf(with_causes, sizeof with_causes, ", with %s %s", what, extended);
     }
     snprintf(
@@ -137,7 +150,7 @@ size_t wording_next(const struct diagnosis *self, size_t max, char (*out_texts)[
         char one[wording_short], other[wording_short];
         wording_effect(self->ties[i].effects[0], one);
         wording_effect(self->ties[i].effects[1], other);
-        snprintf(out_texts[count++], wording_size, "To tell %s from %s: measure %s.", one, other, self->ties[i].next);
+        snprintf(out_texts[count++], wording_size, "To tell %s from %s: %s.", one, other, self->ties[i].next);
     }
     bool open = self->verdict == diagnosis_unexplained;
     for (size_t i = 0; open && i < self->candidate_count && count < max; i++) {
@@ -155,6 +168,9 @@ size_t wording_next(const struct diagnosis *self, size_t max, char (*out_texts)[
     if (self->verdict == diagnosis_explained && self->cause_count > 0 && count < max) {
         snprintf(out_texts[count++], wording_size,
                  "Take over the extended model (--extended M.json writes it; servoscope simulate and drive run it).");
+    }
+    if (self->verdict == diagnosis_no_discrepancy && refit_matters(self) && count < max) {
+        snprintf(out_texts[count++], wording_size, "Take over the refitted numbers (--extended M.json writes them).");
     }
     return count;
 }

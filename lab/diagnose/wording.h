@@ -25,7 +25,7 @@ void wording_list(const struct diagnosis_cause *causes, size_t count, size_t siz
 /// A share as a percentage of three digits: "4.81 %"; "unknown" if it is not finite.
 void wording_percent(double share, char out_text[wording_short]);
 
-/// An estimate with the digits that its standard deviation allows: "0.0312 ± 0.0004", "12 (exact)" for one of 0.
+/// An estimate with the digits that its standard deviation allows: "0.03120 ± 0.00042".
 void wording_estimate(double value, double deviation, char out_text[2 * wording_short]);
 
 /// The verdict in a few words.
@@ -33,6 +33,9 @@ void wording_headline(const struct diagnosis *self, char out_text[wording_size])
 
 /// What the verdict is worth: how far each model is off on data the fit has not seen, and what the noise allows.
 void wording_gain(const struct diagnosis *self, char out_text[wording_size]);
+
+/// Whether the extended model is more than the refitted one: anything was found, claimed or not.
+bool wording_is_extended(const struct diagnosis *self);
 
 /// Share of the given model's squared error above the noise floor that the extended model takes away; NaN where the
 /// given model is no worse than the noise floor.

@@ -9,9 +9,32 @@
 
 static const double two_pi = 6.283185307179586;
 
+enum { units_size = 40 };
+
 static double decibel(double magnitude)
 {
     return 20.0 * log10(magnitude); // minus infinity for 0: a gap in the figure
+}
+
+/// "rad_per_s/Nm" as a person writes it: "(rad/s)/Nm".
+static void readable_units(const char *units, char out_text[units_size])
+{
+    const char *over = strchr(units, '/');
+    const size_t numerator = over ? (size_t)(over - units) : strlen(units);
+    const bool compound = over && memchr(units, '_', numerator);
+    size_t used = 0;
+    for (const char *at = units; *at && used + 4 < units_size;) {
+        if (at == units && compound) {
+            out_text[used++] = '(';
+        }
+        if (at == over && compound) {
+            out_text[used++] = ')';
+        }
+        const bool per = strncmp(at, "_per_", 5) == 0;
+        out_text[used++] = per ? '/' : *at;
+        at += per ? 5 : 1;
+    }
+    out_text[used] = '\0';
 }
 
 /// The measured lines that are valid, as the figure wants them.
@@ -172,10 +195,15 @@ static void add_bode(const struct drawing *drawing, const struct frf_report_opti
     struct figure_panel *magnitude = figure_add_panel(figure, label, axis_linear);
     struct figure_panel *phase = figure_add_panel(figure, "phase in degrees", axis_degrees);
     phase->height = 130;
-    figure_add_band(magnitude, "2 std", lines->count, lines->frequency_hz, lines->low_db, lines->high_db);
+    figure_add_band(magnitude, "±2 std", lines->count, lines->frequency_hz, lines->low_db, lines->high_db);
     figure_add_band(phase, "", lines->count, lines->frequency_hz, lines->phase_low_deg, lines->phase_high_deg);
-    figure_add_points(magnitude, "measured", lines->count, lines->frequency_hz, lines->magnitude_db)->size = 4;
-    figure_add_points(phase, "", lines->count, lines->frequency_hz, lines->phase_deg)->size = 4;
+    struct figure_series *points[2] = {
+        figure_add_points(magnitude, "measured", lines->count, lines->frequency_hz, lines->magnitude_db),
+        figure_add_points(phase, "", lines->count, lines->frequency_hz, lines->phase_deg)};
+    for (size_t i = 0; i < 2; i++) {
+        points[i]->size = 5;
+        points[i]->colour = figure_blue;
+    }
     for (size_t c = 0; c < options->curve_count; c++) {
         const struct frf_model_curve *model = &options->curves[c];
         const struct curve *curve = &drawing->curves[c];
@@ -216,19 +244,22 @@ static void add_errors(const struct drawing *drawing, const struct frf_report_op
     figure_add_limit(panel, "1: within 2 std", 1.0);
 }
 
-static void add_sentence(struct page *page, const struct frf *frf, const struct drawing *drawing,
-                         const struct frf_report_options *options)
+static void add_sentences(struct page *page, const struct frf *frf, const struct drawing *drawing,
+                          const struct frf_report_options *options)
 {
     const struct lines *lines = &drawing->lines;
     page_add_paragraph(page, "From %s to %s by method %s, %zu of %zu lines valid.", frf->input, frf->output, frf->method,
                        lines->count, frf->count);
+    if (options->curve_count == 0) {
+        return;
+    }
+    page_start_list(page);
     for (size_t c = 0; c < options->curve_count; c++) {
         const struct curve *curve = &drawing->curves[c];
-        if (curve->compared > 0) {
-            page_add_paragraph(page, "%s: off by more than 2 std on %zu of %zu lines.", options->curves[c].name,
-                               curve->beyond, curve->compared);
-        }
+        page_add_item(page, options->curves[c].name, "is off by more than 2 std at %zu of %zu lines.", curve->beyond,
+                      curve->compared);
     }
+    page_end_list(page);
 }
 
 void frf_report_section(struct page *page, const struct frf *frf, const struct frf_report_options *options)
@@ -236,16 +267,18 @@ void frf_report_section(struct page *page, const struct frf *frf, const struct f
     static const struct frf_report_options none = {0};
     struct drawing drawing;
     struct figure figure;
+    char units[units_size];
     options = options ? options : &none;
     page_add_section(page, "Frequency response");
     if (!make_drawing(frf, options, &drawing)) {
         page_add_paragraph(page, "Memory was short for this section.");
         return;
     }
-    add_sentence(page, frf, &drawing, options);
+    add_sentences(page, frf, &drawing, options);
+    readable_units(frf->units, units);
     figure_start(&figure, "frequency in Hz", axis_log);
-    add_bode(&drawing, options, frf->units, &figure);
-    add_deviations(&drawing, frf->units, &figure);
+    add_bode(&drawing, options, units, &figure);
+    add_deviations(&drawing, units, &figure);
     if (options->curve_count > 0) {
         add_errors(&drawing, options, &figure);
     }

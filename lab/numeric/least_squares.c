@@ -5,6 +5,9 @@
 #include <math.h>
 #include <stdlib.h>
 
+/// Present if the LAPACK in use is OpenBLAS, whose threads only get in each other's way on systems this small.
+extern void openblas_set_num_threads(int threads) __attribute__((weak));
+
 static double dot(size_t n, const double *a, const double *b)
 {
     double sum = 0.0;
@@ -40,6 +43,17 @@ static void normal_equations(size_t rows, size_t columns, const double *A, const
     }
 }
 
+/// Whether columns are independent: the square of a pivot of the factor is what a column of length 1 has of its own, apart
+/// from those before it. Dependent columns leave rounding there, of either sign, so that the factorisation may go through.
+static bool independent(size_t columns, const double *factor)
+{
+    const double own_least = 1e-14;
+    for (size_t i = 0; i < columns; i++)
+        if (!(factor[i * columns + i] * factor[i * columns + i] > own_least))
+            return false;
+    return true;
+}
+
 static void store_covariance(size_t columns, const double *inverse, const double *norm, const double *gram_diagonal,
                              double *out_covariance)
 {
@@ -54,6 +68,8 @@ static void store_covariance(size_t columns, const double *inverse, const double
 bool least_squares_solve(size_t rows, size_t columns, const double *A, const double *b, const double *weight,
                          const double *centre, double *out_x, double *out_covariance)
 {
+    if (openblas_set_num_threads)
+        openblas_set_num_threads(1);
     double *work = malloc((columns * columns + 3 * columns) * sizeof *work);
     if (!work)
         return false;
@@ -64,7 +80,7 @@ bool least_squares_solve(size_t rows, size_t columns, const double *A, const dou
     normal_equations(rows, columns, A, b, weight, centre, norm, H, g);
     lapack_int n = (lapack_int)columns;
     // 'L' of a column-major matrix: element (i, j), i >= j, lies at [j * columns + i].
-    bool good = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', n, 1, H, n, g, n) == 0;
+    bool good = LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', n, 1, H, n, g, n) == 0 && independent(columns, H);
     if (good && out_covariance)
         good = LAPACKE_dpotri(LAPACK_COL_MAJOR, 'L', n, H, n) == 0;
     if (good) {

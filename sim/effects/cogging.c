@@ -21,10 +21,10 @@ static void cogging_oppose(const double *p, const struct sim_motion *motion, str
 }
 
 /// Ripple needs room to show: from 1.5 periods over the covered span, in steps that half a period at its end cannot slip
-/// through, up to 160.
+/// through, up to 110.
 static bool cogging_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
 {
-    const double fewest = 1.5, step = 0.35, most = 160.0;
+    const double fewest = 1.5, step = 0.4, most = 110.0;
     double periods = fewest + step * (double)index;
     double rate = turn * periods / coverage->position_span;
     out[0] = 0.01 * coverage->torque_rms;

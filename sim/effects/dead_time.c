@@ -3,7 +3,10 @@
 #include "sim/effect.h"
 #include "sim/model.h"
 
+#include <math.h>
 #include <stdio.h>
+
+extern const struct sim_effect sim_effect_dead_time;
 
 static bool delay_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
 {
@@ -11,7 +14,7 @@ static bool delay_scan(const struct sim_model *model, const struct sim_coverage 
     (void)coverage;
     if (index >= sizeof samples / sizeof samples[0])
         return false;
-    out[0] = samples[index] / model->sample_rate_hz;
+    out[0] = fmin(samples[index] / model->sample_rate_hz, sim_effect_dead_time.parameters[0].maximum);
     return true;
 }
 

@@ -26,10 +26,11 @@ static bool stribeck_scan(const struct sim_model *model, const struct sim_covera
 /// Slow enough to be friction at low speed, fast enough for the recording to have moved that slowly for a while.
 static bool stribeck_testable(const double *p, const struct sim_coverage *coverage, char *out_why, size_t size)
 {
-    bool enough = p[1] < 1.2 * coverage->velocity_rms;
-    if (!enough)
-        snprintf(out_why, size, "its speed %.3g is not below the speed of the motion (%.3g RMS)", p[1], coverage->velocity_rms);
-    return enough;
+    double low = 0.02 * coverage->velocity_rms, high = 1.2 * coverage->velocity_rms;
+    bool shown = p[1] > low && p[1] < high;
+    if (!shown)
+        snprintf(out_why, size, "its speed %.3g is outside of %.3g..%.3g, where this motion could show it", p[1], low, high);
+    return shown;
 }
 
 static void stribeck_say(const struct sim_finding *f, char *out_text, size_t size)

@@ -3,7 +3,10 @@
 #include "sim/effect.h"
 #include "sim/model.h"
 
+#include <math.h>
 #include <stdio.h>
+
+extern const struct sim_effect sim_effect_torque_lag;
 
 static bool lag_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
 {
@@ -11,7 +14,8 @@ static bool lag_scan(const struct sim_model *model, const struct sim_coverage *c
     (void)coverage;
     if (index >= sizeof steps / sizeof steps[0])
         return false;
-    out[0] = steps[index] * (model->torque_lag_s > 0.0 ? model->torque_lag_s : 1.0 / model->sample_rate_hz);
+    double lag_s = model->torque_lag_s > 0.0 ? model->torque_lag_s : 1.0 / model->sample_rate_hz;
+    out[0] = fmin(steps[index] * lag_s, sim_effect_torque_lag.parameters[0].maximum);
     return true;
 }
 

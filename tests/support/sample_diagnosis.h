@@ -132,7 +132,7 @@ static inline void sample_diagnosis(bool linear, struct diagnosis *out)
     out->tie_count = 1;
     out->ties[0].effects[0] = sim_effect_find("load_bias");
     out->ties[0].effects[1] = sim_effect_find("asymmetric_friction");
-    snprintf(out->ties[0].next, sizeof out->ties[0].next, "a run at half the level");
+    snprintf(out->ties[0].next, sizeof out->ties[0].next, "measure a run at half the level");
     out->untestable_count = 1;
     out->untestable[0].effect = sim_effect_find("belt_elasticity");
     snprintf(out->untestable[0].why, sizeof out->untestable[0].why,
