@@ -42,7 +42,7 @@ static void make_rows(const struct design_request *request, const struct design_
     };
     rows[row_acceleration] = (struct row){
         "acceleration",
-        linear ? "m/s2" : "rad/s2",
+        linear ? "m/s²" : "rad/s²",
         result->acceleration_rad_per_s2,
         limits->acceleration_rad_per_s2,
         at->acceleration_rad_per_s2,
@@ -152,7 +152,7 @@ static void add_pairs(struct page *page, const struct design_request *request, c
                   line_hz * result->bins[result->bin_count - 1]);
     page_add_pair(page, "period", "%zu samples, %.6g s", result->period_samples, 1 / line_hz);
     page_add_pair(page, request->linear ? "moved mass" : "inertia", "%.6g %s", request->inertia_kgm2,
-                  request->linear ? "kg" : "kg m2");
+                  request->linear ? "kg" : "kg m²");
     page_add_pair(page, request->linear ? "effective force" : "effective torque", "%.4f %s, crest factor %.3f",
                   result->effective_torque_Nm, unit, result->crest_factor);
     if (result->effective_torque_continuous_Nm < result->effective_torque_Nm) {

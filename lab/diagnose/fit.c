@@ -149,43 +149,62 @@ static bool moved(const struct hypothesis *h, const double *x)
     return false;
 }
 
-bool fit_run(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis, size_t iterations)
+/// Tries the step to x; takes it if it improves. Returns false when there is nothing more to be had.
+static bool take_step(struct fit *self, const struct fit_data *data, struct hypothesis *h, const double *x, double *trial,
+                      double *io_damping, bool *out_taken)
 {
-    struct hypothesis *h = io_hypothesis;
+    const double settled = 1e-3; // of -2 log likelihood
+    double cost = residual_at(data, h, x, trial), before = self->cost;
+    *out_taken = cost < before;
+    if (!*out_taken) {
+        *io_damping = *io_damping > 0.0 ? *io_damping * 8.0 : 1e-2;
+        return *io_damping < 1e4;
+    }
+    memcpy(h->x, x, h->count * sizeof *x);
+    memcpy(self->residual, trial, data->values * sizeof *trial);
+    self->cost = cost;
+    *io_damping = *io_damping > 1e-3 ? *io_damping * 0.1 : 0.0;
+    return before - cost > settled;
+}
+
+/// Up to `iterations` steps; `finish`: derivatives and covariance at the x where it ends.
+static bool improve(struct fit *self, const struct fit_data *data, struct hypothesis *h, size_t iterations, bool finish)
+{
     size_t rows = data->values;
     double *work = malloc((rows * h->count + 2 * rows) * sizeof *work);
     if (!work)
         return false;
     double *trial = work + rows * h->count + rows;
     double damping = 0.0, x[hypothesis_coordinates_max];
-    bool good = true, fresh = false;
+    bool good = true, fresh = false, more = true;
     self->cost = residual_at(data, h, h->x, self->residual);
-    for (size_t i = 0; i <= iterations && good; i++) {
+    for (size_t i = 0; i < iterations && good && more; i++) {
         if (!fresh)
             differentiate(self, data, h, self->residual);
         fresh = true;
         good = solve_step(self, data, h, damping, work, x, self->covariance);
-        if (!good || i == iterations || !moved(h, x))
-            break;
-        double cost = residual_at(data, h, x, trial);
-        if (cost < self->cost) {
-            bool settled = self->cost - cost < 1e-3;
-            memcpy(h->x, x, h->count * sizeof *x);
-            memcpy(self->residual, trial, rows * sizeof *trial);
-            self->cost = cost;
-            damping = damping > 1e-3 ? damping * 0.1 : 0.0;
-            fresh = false;
-            if (settled)
-                i = iterations - 1; // one more pass for derivatives and covariance at the final x
-        } else {
-            damping = damping > 0.0 ? damping * 8.0 : 1e-2;
-            if (damping > 1e4)
-                break;
-        }
+        bool taken = false;
+        more = good && moved(h, x) && take_step(self, data, h, x, trial, &damping, &taken);
+        fresh = !taken;
+    }
+    if (good && finish) {
+        if (!fresh)
+            differentiate(self, data, h, self->residual);
+        good = solve_step(self, data, h, 0.0, work, x, self->covariance);
     }
     self->prior = prior_cost(h, h->x);
     free(work);
     return good;
+}
+
+bool fit_run(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis, size_t iterations)
+{
+    return improve(self, data, io_hypothesis, iterations, true);
+}
+
+bool fit_roughly(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis, size_t iterations)
+{
+    return improve(self, data, io_hypothesis, iterations, false);
 }
 
 /// Index of the same coordinate in another hypothesis, or its count.

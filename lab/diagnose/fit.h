@@ -31,6 +31,9 @@ void fit_residual(const struct fit_data *data, const struct sim_model *model, do
 /// belong to the returned x. Errors: false if memory is short or the linear system cannot be solved; x is then the best so far.
 bool fit_run(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis, size_t iterations);
 
+/// The same without derivatives and covariance at the end: a look at what could be had.
+bool fit_roughly(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis, size_t iterations);
+
 /// One step of a hypothesis that extends `base`: derivatives by the coordinates that both share are taken from `base_fit`,
 /// only those of the new ones are computed. Leaves cost and x of the better of start and step; no covariance.
 /// Errors: as fit_run.

@@ -87,10 +87,11 @@ static void add_nuisance(struct hypothesis *self, const struct tolerance *t)
         c.weight = 0.0;
         c.lower = -40.0;
         c.upper = 40.0;
-    } else if (split_unknown) { // a rigid model knows the sum; how it splits is for the data to say
-        c.weight = 1.0;
-        c.lower = -3.0;
-        c.upper = 3.0;
+    } else if (split_unknown) { // a rigid model shows the sum only: its split may be less exact, or not known at all
+        bool given = self->given->motor_inertia_kgm2 > 0.0 && self->given->load_inertia_kgm2 > 0.0;
+        c.weight = given ? 10.0 : 1.0;
+        c.lower = given ? -0.4 : -3.0;
+        c.upper = given ? 0.4 : 3.0;
     }
     add_coordinate(self, c, 0.0);
 }

@@ -106,6 +106,33 @@ static void judge_names(const struct blackbox *box, const struct fit_data *data,
     }
 }
 
+/// Whether one group of the black box, beside the given model, does as well as three or more names together: one gap, then,
+/// which the catalogue pieces together. Returns the group, or blackbox_groups if there is none.
+static enum blackbox_group one_gap(const struct blackbox *box, const struct fit_data *data, const struct hypothesis *h,
+                                   const struct fit *fit)
+{
+    struct fit trial;
+    struct hypothesis bare;
+    size_t names = 0;
+    for (int e = 0; sim_effects[e]; e++)
+        names += h->named[e];
+    const size_t patchwork = 3;
+    if (names < patchwork || !fit_init(&trial, data))
+        return blackbox_groups;
+    hypothesis_init(&bare, h->given, h->inertia_free, h->actuator_seen);
+    enum blackbox_group found = blackbox_groups;
+    if (fit_run(&trial, data, &bare, trial_iterations))
+        for (int g = 0; g < blackbox_groups && found == blackbox_groups; g++) {
+            double columns = (double)(box->group_begin[g + 1] - box->group_begin[g]), left;
+            blackbox_gain(box, data, &bare, &trial, 1u << g, &left, NULL);
+            // It has more freedom than the names: what chance gains with that is not held against them.
+            if (left + columns < fit->cost + 0.01 * (trial.cost - fit->cost))
+                found = (enum blackbox_group)g;
+        }
+    fit_free(&trial);
+    return found;
+}
+
 bool judge(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,
            const struct fit *fit, double validation_rms, struct judgement *out_judgement)
 {
@@ -118,10 +145,16 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
     j->leftover = blackbox_gain(&box, data, hypothesis, fit, blackbox_all, &left, NULL);
     double scale = fmax(left / (double)data->values, 1.0);
     double chance = 0.5 * (double)box.columns + 12.0 * sqrt(0.5 * (double)box.columns);
-    const double half_again = 1.5;
-    j->unexplained = j->leftover / scale > chance || fit->cost / (double)data->values > half_again * half_again ||
+    const double half_again = 1.5, visible = 1.12; // a third of the noise, in amplitude
+    j->unexplained = (j->leftover / scale > chance && fit->cost > visible * left) || fit->cost / (double)data->values > half_again * half_again ||
                      !(validation_rms < half_again);
-    if (j->unexplained)
+    enum blackbox_group gap = hypothesis->inertia_free ? blackbox_groups : one_gap(&box, data, hypothesis, fit);
+    if (gap != blackbox_groups && !j->unexplained) {
+        j->unexplained = true;
+        j->leftover = fit->cost;
+        snprintf(j->where, sizeof j->where, "several names were needed for one gap, which %s alone would close",
+                 blackbox_group_name(gap));
+    } else if (j->unexplained)
         describe_rest(&box, data, hypothesis, fit, j->where, sizeof j->where);
     judge_names(&box, data, coverage, hypothesis, fit, j);
     blackbox_free(&box);

@@ -15,8 +15,8 @@ struct judgement {
 };
 
 /// Judges a finished search. `validation_rms` is the whitened RMS of the extended model on the validation data.
-/// Unexplained: the black box gains more than chance allows (its expected gain plus twelve standard deviations), or the
-/// residual on fit or validation data is half again as large as the noise. A name stands if it explains a visible share of the
+/// Unexplained: the black box gains more than chance allows (its expected gain plus twelve standard deviations) and more than a
+/// third of the noise in amplitude, or one group of it does as well as three names, or the residual on fit or validation data is half again as large as the noise. A name stands if it explains a visible share of the
 /// torque and, where something stays unexplained, far more than what stays and more than the black box can do without it.
 /// Errors: false if memory is short.
 bool judge(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,

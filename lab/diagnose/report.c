@@ -107,7 +107,7 @@ static void add_excess(struct page *page, const struct diagnosis *self)
     page_add_paragraph(
         page,
         "The given model's error is larger than noise explains (two standard deviations) at %zu of %zu lines, worst at "
-        "%.4g Hz, by a factor of %.3g; the %s model's at %zu of them, worst at %.4g Hz, by a factor of %.3g. Of a "
+        "%.4g Hz, by a factor of %.4g; the %s model's at %zu of them, worst at %.4g Hz, by a factor of %.4g. Of a "
         "perfect "
         "model's lines about 2 in 100 would be above by chance, %.0f here.",
         before.above, before.bins, before.worst_hz, before.worst, best_model(self), after.above, after.worst_hz,

@@ -108,7 +108,7 @@ size_t report_worst_stretch(const struct diagnosis_curves *curves, size_t width)
     return best;
 }
 
-/// Value of the extended model's friction curve at a speed, NaN outside it and in the jump at standstill; speeds ascend.
+/// Value of the extended model's friction curve at a speed, NaN outside it and in the jump at standstill.
 static double curve_at(const struct diagnosis_curves *c, double velocity)
 {
     for (size_t i = 1; i < c->curve_points; i++) {

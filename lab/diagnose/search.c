@@ -132,8 +132,34 @@ static size_t choose_scan(const struct fit_data *data, const struct sim_coverage
     return count;
 }
 
-/// Tries one effect from its scan values with one step each, or a short fit where the structure changes and derivatives of the
-/// old one are worth nothing; keeps the best.
+/// Where the structure changes, derivatives of the old one are worth nothing: the scan values with the lowest cost as they are
+/// get a short fit of their own.
+static void scan_restructured(struct fit *scratch, const struct fit_data *data, const struct hypothesis *from, int effect,
+                              double values[][sim_effect_parameters_max], size_t count, struct candidate *out)
+{
+    enum { tried = 4 };
+    double costs[sim_effect_scan_max];
+    for (size_t i = 0; i < count; i++) {
+        struct hypothesis trial = *from;
+        hypothesis_name(&trial, effect, values[i]);
+        costs[i] = fit_cost(scratch, data, &trial, trial.x);
+    }
+    for (size_t round = 0; round < tried && round < count; round++) {
+        size_t best = 0;
+        for (size_t i = 1; i < count; i++)
+            if (costs[i] < costs[best])
+                best = i;
+        costs[best] = INFINITY;
+        struct hypothesis trial = *from;
+        hypothesis_name(&trial, effect, values[best]);
+        if (fit_roughly(scratch, data, &trial, scan_iterations) && scratch->cost < out->cost) {
+            out->cost = scratch->cost;
+            out->hypothesis = trial;
+        }
+    }
+}
+
+/// Tries one effect from its scan values with one step each; keeps the best.
 static bool scan_effect(struct fit *scratch, const struct fit_data *data, const struct sim_coverage *coverage,
                         const struct hypothesis *from, const struct fit *fit, int effect, struct candidate *out)
 {
@@ -144,10 +170,11 @@ static bool scan_effect(struct fit *scratch, const struct fit_data *data, const 
     for (size_t i = 0; i < count; i++) {
         struct hypothesis trial = *from;
         hypothesis_name(&trial, effect, values[i]);
-        bool restructured = trial.engaged.structure != from->engaged.structure;
-        if (!(restructured ? fit_run(scratch, data, &trial, scan_iterations) : fit_step(scratch, data, from, fit, &trial)))
-            continue;
-        if (scratch->cost < out->cost) {
+        if (trial.engaged.structure != from->engaged.structure) {
+            scan_restructured(scratch, data, from, effect, values, count, out);
+            break;
+        }
+        if (fit_step(scratch, data, from, fit, &trial) && scratch->cost < out->cost) {
             out->cost = scratch->cost;
             out->hypothesis = trial;
         }
@@ -253,6 +280,12 @@ static bool drop_weakest(const struct fit_data *data, struct hypothesis *io_h, s
     return true;
 }
 
+static void drop_unneeded(const struct fit_data *data, struct hypothesis *io_h, struct fit *fit)
+{
+    while (drop_weakest(data, io_h, fit)) {
+    }
+}
+
 static size_t named_count(const struct hypothesis *h)
 {
     size_t count = 0;
@@ -269,10 +302,10 @@ bool search_run(const struct fit_data *data, const struct sim_coverage *coverage
     for (size_t round = 0; round < 2 * options->causes_max && named_count(io_hypothesis) < options->causes_max; round++) {
         if (options->progress && !options->progress(options->user, "searching"))
             break;
+        drop_unneeded(data, io_hypothesis, io_fit);
         if (!add_best(data, coverage, io_hypothesis, io_fit))
             break;
-        while (named_count(io_hypothesis) > 1 && drop_weakest(data, io_hypothesis, io_fit)) {
-        }
     }
+    drop_unneeded(data, io_hypothesis, io_fit);
     return true;
 }

@@ -143,34 +143,51 @@ static bool next_of_effect(int effect, const char *lead, char out_text[wording_s
     return measure != NULL;
 }
 
+/// While something is unexplained: what would confirm the candidates, and what would show the effects not tested for.
+static size_t next_of_open(const struct diagnosis *self, size_t max, char (*out_texts)[wording_size])
+{
+    size_t count = 0;
+    for (size_t i = 0; i < self->candidate_count && count < max; i++) {
+        count += next_of_effect(self->candidates[i].effect, "To confirm or rule out", out_texts[count]);
+    }
+    for (size_t i = 0; i < self->untestable_count && count < max; i++) {
+        count += next_of_effect(self->untestable[i].effect, "To test for", out_texts[count]);
+    }
+    return count;
+}
+
+/// What is worth taking over into the model, NULL if nothing is.
+static const char *next_of_model(const struct diagnosis *self)
+{
+    if (self->verdict == diagnosis_explained && self->cause_count > 0) {
+        return "Take over the extended model (--extended M.json writes it; servoscope simulate and drive run it).";
+    }
+    if (self->verdict == diagnosis_no_discrepancy && refit_matters(self)) {
+        return "Take over the refitted numbers (--extended M.json writes them).";
+    }
+    return NULL;
+}
+
 size_t wording_next(const struct diagnosis *self, size_t max, char (*out_texts)[wording_size])
 {
     size_t count = 0;
-    for (size_t i = 0; i < self->tie_count && count < max; i++) {
+    for (; count < self->tie_count && count < max; count++) {
         char one[wording_short], other[wording_short];
-        wording_effect(self->ties[i].effects[0], one);
-        wording_effect(self->ties[i].effects[1], other);
-        snprintf(out_texts[count++], wording_size, "To tell %s from %s: %s.", one, other, self->ties[i].next);
+        wording_effect(self->ties[count].effects[0], one);
+        wording_effect(self->ties[count].effects[1], other);
+        snprintf(out_texts[count], wording_size, "To tell %s from %s: %s.", one, other, self->ties[count].next);
     }
-    bool open = self->verdict == diagnosis_unexplained;
-    for (size_t i = 0; open && i < self->candidate_count && count < max; i++) {
-        count += next_of_effect(self->candidates[i].effect, "To confirm or rule out", out_texts[count]);
-    }
-    for (size_t i = 0; open && i < self->untestable_count && count < max; i++) {
-        count += next_of_effect(self->untestable[i].effect, "To test for", out_texts[count]);
+    if (self->verdict == diagnosis_unexplained) {
+        count += next_of_open(self, max - count, out_texts + count);
     }
     if (self->held_back && count < max) {
-        snprintf(
-            out_texts[count++], wording_size,
-            "Record a second run with other phases and give it with --validate: now a part of the only run stands in "
-            "for it.");
-    }
-    if (self->verdict == diagnosis_explained && self->cause_count > 0 && count < max) {
         snprintf(out_texts[count++], wording_size,
-                 "Take over the extended model (--extended M.json writes it; servoscope simulate and drive run it).");
+                 "Record a second run with other phases and give it with --validate: now a part of the only run stands "
+                 "in for it.");
     }
-    if (self->verdict == diagnosis_no_discrepancy && refit_matters(self) && count < max) {
-        snprintf(out_texts[count++], wording_size, "Take over the refitted numbers (--extended M.json writes them).");
+    const char *take_over = next_of_model(self);
+    if (take_over && count < max) {
+        snprintf(out_texts[count++], wording_size, "%s", take_over);
     }
     return count;
 }

@@ -27,8 +27,8 @@ static void elasticity_engage(struct sim_model *model)
 /// Resonances from an eighth of the highest line up to four times it; beyond, the belt is rigid to this recording.
 static bool elasticity_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
 {
-    const double first = 0.125, growth = 1.45, damping_ratio = 0.03;
-    if (index >= 10)
+    const double first = 0.125, growth = 1.25, damping_ratio = 0.03;
+    if (index >= sim_effect_scan_max)
         return false;
     struct sim_model engaged = *model;
     elasticity_engage(&engaged);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/// The published least-squares figures of EMPS (Janot, Gautier, Brunot, "Data Set and Reference Models of EMPS", 2019) from the
-/// published recordings, through this project's reader, filters and least squares. SERVOSCOPE_DATA names the recordings' folder.
+/// The published least-squares figures of EMPS (Janot, Gautier, Brunot, "Data Set and Reference Models of EMPS", 2019)
+/// from the published recordings, through this project's reader, filters and least squares. SERVOSCOPE_DATA names the
+/// recordings' folder.
 #include "lab/numeric/filter.h"
 #include "lab/numeric/least_squares.h"
 #include "lab/record/run.h"
@@ -105,7 +106,8 @@ static struct regression prepare(const char *name, bool asymmetric)
     for (size_t c = 0; c <= r.columns; c++) {
         for (size_t i = 0; i < kept; i++) {
             size_t j = i + leading_dropped;
-            signal[i] = c == 0 ? run_column(&run, "force_N")[j] : regressor(c - 1, asymmetric, velocity[j], acceleration[j]);
+            signal[i] =
+                c == 0 ? run_column(&run, "force_N")[j] : regressor(c - 1, asymmetric, velocity[j], acceleration[j]);
         }
         decimate(kept, signal, r.rows, r.force + c * r.rows);
     }
@@ -170,12 +172,9 @@ static void test_emps_asymmetric_friction_gives_the_published_figures(void)
     struct regression r = prepare("DATA_EMPS.csv", true);
     fit(&r, beta);
     const struct figure figures[] = {
-        {"M, kg", 95.1540, beta[0]},
-        {"Fv+, N s/m", 166.7061, beta[1]},
-        {"Fc+, N", 20.1440, beta[2]},
-        {"Fv-, N s/m", 240.4236, beta[3]},
-        {"Fc-, N", 20.6277, beta[4]},
-        {"relative error, %", 3.1117, relative_error_percent(&r, beta)},
+        {"M, kg", 95.1540, beta[0]},  {"Fv+, N s/m", 166.7061, beta[1]},
+        {"Fc+, N", 20.1440, beta[2]}, {"Fv-, N s/m", 240.4236, beta[3]},
+        {"Fc-, N", 20.6277, beta[4]}, {"relative error, %", 3.1117, relative_error_percent(&r, beta)},
     };
     compare(sizeof figures / sizeof figures[0], figures);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/// A diagnosis filled by hand, with numbers as a real one has them: cogging and a Stribeck effect found on a belt drive.
+/// A diagnosis filled by hand, with numbers as a real one has them: cogging and a Stribeck effect on a belt drive.
 #ifndef SERVOSCOPE_TESTS_SUPPORT_SAMPLE_DIAGNOSIS_H
 #define SERVOSCOPE_TESTS_SUPPORT_SAMPLE_DIAGNOSIS_H
 

@@ -64,15 +64,18 @@ static void assert_staircase(double delay, double lag)
         TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(rounding, staircase((double)n, n, delay, lag), now, message);
         for (size_t i = 0; i < sim_substeps; i++) {
             double from = (double)n + (double)i / sim_substeps, to = (double)n + (double)(i + 1) / sim_substeps;
-            double mean = sim_substeps * (staircase_integral(to, n, delay, lag) - staircase_integral(from, n, delay, lag));
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(20.0 * rounding, mean, sim_actuator_substep(&actuator, &model, i), message);
+            double mean =
+                sim_substeps * (staircase_integral(to, n, delay, lag) - staircase_integral(from, n, delay, lag));
+            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(20.0 * rounding, mean, sim_actuator_substep(&actuator, &model, i),
+                                              message);
         }
     }
 }
 
 static void test_actuator_follows_the_staircase_exactly_for_any_dead_time_and_lag(void)
 {
-    static const double delays[] = {0.0, 1e-7, 0.1, 0.25, 0.3, 0.5, 0.75, 0.9, 1.0, 1.25, 1.7, 2.0, 3.0, 3.6, 7.0, 29.4, 60.0};
+    static const double delays[] = {0.0,  1e-7, 0.1, 0.25, 0.3, 0.5, 0.75, 0.9, 1.0,
+                                    1.25, 1.7,  2.0, 3.0,  3.6, 7.0, 29.4, 60.0};
     static const double lags[] = {0.0, 0.05, 0.3, 1.0, 4.0, 40.0};
     static const double rates_hz[] = {1000.0, 8000.0, 3333.3};
     for (size_t r = 0; r < sizeof rates_hz / sizeof rates_hz[0]; r++) {

@@ -108,8 +108,8 @@ static void test_belt_drive_sensor_noise_has_the_given_deviations(void)
     const double chance = 0.05;
     const struct sim_command off = {.control = sim_control_off};
     double sums[4] = {0};
-    model.sensors = (struct sim_sensors){
-        .position_noise_rad = 2e-5, .velocity_noise_rad_per_s = 3e-3, .torque_noise_Nm = 4e-3};
+    model.sensors =
+        (struct sim_sensors){.position_noise_rad = 2e-5, .velocity_noise_rad_per_s = 3e-3, .torque_noise_Nm = 4e-3};
     sim_belt_drive_init(&drive, &model, 1.5);
     for (size_t n = 0; n < count; n++) {
         sim_belt_drive_step(&drive, &off, &sample);
@@ -196,8 +196,11 @@ static void test_belt_drive_cascade_follows(void)
 static void test_belt_drive_cascade_is_the_documented_law(void)
 {
     without_noise();
-    model.controller = (struct sim_controller){.position_gain_per_s = 30.0, .velocity_gain_Nms_per_rad = 0.5,
-        .velocity_integral_time_s = 0.1, .velocity_feedforward = 0.8, .torque_feedforward = 0.6};
+    model.controller = (struct sim_controller){.position_gain_per_s = 30.0,
+                                               .velocity_gain_Nms_per_rad = 0.5,
+                                               .velocity_integral_time_s = 0.1,
+                                               .velocity_feedforward = 0.8,
+                                               .torque_feedforward = 0.6};
     double integral = 0.0;
     sim_belt_drive_init(&drive, &model, 0.0);
     for (size_t n = 0; n < 300; n++) {
@@ -214,7 +217,8 @@ static void test_belt_drive_off_gives_no_torque_and_forgets_the_integral(void)
     without_noise();
     model.coulomb_friction_Nm = 0.1;
     sim_belt_drive_init(&drive, &model, 0.0);
-    const struct sim_command far = {.control = sim_control_cascade, .position = 1e-3}, off = {.control = sim_control_off};
+    const struct sim_command far = {.control = sim_control_cascade, .position = 1e-3},
+                             off = {.control = sim_control_off};
     play(&far, 200);
     TEST_ASSERT_TRUE(drive.velocity_integral != 0.0);
     play(&off, 1);
@@ -222,14 +226,14 @@ static void test_belt_drive_off_gives_no_torque_and_forgets_the_integral(void)
     TEST_ASSERT_EQUAL_DOUBLE(0.0, drive.velocity_integral);
 }
 
-/// Cruises, then stops quickly: every step of the torque is one that the ramp's steps make through the speed controller.
+/// Cruises, then stops quickly: every step of the torque is one that the ramp's steps make through the speed
+/// controller.
 static void assert_quick_stop(double speed)
 {
     sim_belt_drive_init(&drive, &model, 0.0);
     for (size_t n = 0; n < 3000; n++) {
-        struct sim_command cruise = {.control = sim_control_cascade,
-                                     .position = speed * (double)n / model.sample_rate_hz,
-                                     .velocity = speed};
+        struct sim_command cruise = {
+            .control = sim_control_cascade, .position = speed * (double)n / model.sample_rate_hz, .velocity = speed};
         sim_belt_drive_step(&drive, &cruise, &sample);
     }
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, speed, sample.velocity);
@@ -241,10 +245,12 @@ static void assert_quick_stop(double speed)
     for (size_t n = 0; n < ramp + 500; n++) {
         double before = sample.velocity;
         play(&stop, 1);
-        TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1.001 * ramp_step + 1e-6, last, sample.torque_ref, "torque step in a quick stop");
+        TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1.001 * ramp_step + 1e-6, last, sample.torque_ref,
+                                          "torque step in a quick stop");
         last = sample.torque_ref;
         if (n > 100 && n < ramp)
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.2 * slope, copysign(slope, speed), before - sample.velocity, "deceleration");
+            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.2 * slope, copysign(slope, speed), before - sample.velocity,
+                                              "deceleration");
     }
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-3 * fabs(speed), 0.0, sample.velocity, "speed after the ramp");
     play(&stop, 1500);
@@ -269,7 +275,8 @@ static void test_belt_drive_quick_stop_ramps_to_standstill_without_a_jerk(void)
 
 static void test_belt_drive_quick_stop_from_torque_control_and_with_noise(void)
 {
-    const struct sim_command push = {.control = sim_control_torque, .torque = 0.4}, stop = {.control = sim_control_stop};
+    const struct sim_command push = {.control = sim_control_torque, .torque = 0.4},
+                             stop = {.control = sim_control_stop};
     model.coulomb_friction_Nm = 0.05;
     sim_belt_drive_init(&drive, &model, 0.0);
     play(&push, 300);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/// The diagnosis as JSON: every member of the contract (docs/files.md, "Diagnosis"), names of both kinds of axis, no NaN.
+/// The diagnosis as JSON: every member that a reader counts on, names of both kinds of axis, no NaN.
 #include "lab/diagnose/diagnosis.h"
 #include "lab/record/json_out.h"
 #include "tests/support/sample_diagnosis.h"

@@ -11,11 +11,26 @@
 #include <string.h>
 
 /// docs/files.md, cause ids: files and users know these names, so they stay.
-static const char *const known_ids[] = {
-    "inertia", "viscous_friction", "coulomb_friction", "stribeck_friction", "asymmetric_friction", "load_bias", "presliding",
-    "belt_elasticity", "second_mode", "position_dependent_stiffness", "hardening_stiffness", "backlash", "cogging",
-    "encoder_eccentricity", "torque_lag", "dead_time", "torque_saturation", "periodic_disturbance", "friction_drift",
-    "lost_samples"};
+static const char *const known_ids[] = {"inertia",
+                                        "viscous_friction",
+                                        "coulomb_friction",
+                                        "stribeck_friction",
+                                        "asymmetric_friction",
+                                        "load_bias",
+                                        "presliding",
+                                        "belt_elasticity",
+                                        "second_mode",
+                                        "position_dependent_stiffness",
+                                        "hardening_stiffness",
+                                        "backlash",
+                                        "cogging",
+                                        "encoder_eccentricity",
+                                        "torque_lag",
+                                        "dead_time",
+                                        "torque_saturation",
+                                        "periodic_disturbance",
+                                        "friction_drift",
+                                        "lost_samples"};
 
 static char message[200];
 
@@ -51,7 +66,8 @@ static void test_effects_have_unique_known_ids_and_can_be_found(void)
         for (size_t i = 0; i < sizeof known_ids / sizeof known_ids[0]; i++)
             known = known || strcmp(known_ids[i], sim_effects[e]->id) == 0;
         TEST_ASSERT_TRUE_MESSAGE(known, named(sim_effects[e], "no known cause id"));
-        TEST_ASSERT_EQUAL_INT_MESSAGE((int)e, sim_effect_find(sim_effects[e]->id), named(sim_effects[e], "found elsewhere"));
+        TEST_ASSERT_EQUAL_INT_MESSAGE((int)e, sim_effect_find(sim_effects[e]->id),
+                                      named(sim_effects[e], "found elsewhere"));
     }
     TEST_ASSERT_TRUE(count >= 10);
     TEST_ASSERT_TRUE(count <= sim_effects_max);
@@ -60,10 +76,11 @@ static void test_effects_have_unique_known_ids_and_can_be_found(void)
 
 static void test_effects_parameters_have_units_at_the_end_of_their_names_on_both_axes(void)
 {
-    static const char *const rotary[] = {"_Nm", "_Nms_per_rad", "_Nm_per_rad", "_kgm2", "_rad", "_rad_per_s", "_s", "_hz",
-                                         "_per_rev", "_per_rad", "_per_rad2", "_ratio", "share", NULL};
-    static const char *const linear[] = {"_N", "_Ns_per_m", "_N_per_m", "_kg", "_m", "_m_per_s", "_s", "_hz",
-                                         "_per_m", "_per_m2", "_ratio", "_rad", "share", NULL};
+    static const char *const rotary[] = {"_Nm",        "_Nms_per_rad", "_Nm_per_rad", "_kgm2",    "_rad",
+                                         "_rad_per_s", "_s",           "_hz",         "_per_rev", "_per_rad",
+                                         "_per_rad2",  "_ratio",       "share",       NULL};
+    static const char *const linear[] = {"_N",  "_Ns_per_m", "_N_per_m", "_kg",    "_m",   "_m_per_s", "_s",
+                                         "_hz", "_per_m",    "_per_m2",  "_ratio", "_rad", "share",    NULL};
     for (size_t e = 0; sim_effects[e]; e++) {
         const struct sim_effect *effect = sim_effects[e];
         TEST_ASSERT_TRUE_MESSAGE(effect->parameter_count >= 1 && effect->parameter_count <= sim_effect_parameters_max,
@@ -73,7 +90,8 @@ static void test_effects_parameters_have_units_at_the_end_of_their_names_on_both
             TEST_ASSERT_TRUE_MESSAGE(ends_with_one_of(p->name, rotary), named(effect, p->name));
             TEST_ASSERT_TRUE_MESSAGE(ends_with_one_of(p->linear_name, linear), named(effect, p->linear_name));
             // A torque, an inertia or a speed has to change its name with its unit; an angle may stay one (a phase).
-            if (strstr(p->name, "Nm") || strstr(p->name, "kgm2") || strstr(p->name, "rad_per_s") || strstr(p->name, "rev"))
+            if (strstr(p->name, "Nm") || strstr(p->name, "kgm2") || strstr(p->name, "rad_per_s") ||
+                strstr(p->name, "rev"))
                 TEST_ASSERT_TRUE_MESSAGE(strcmp(p->name, p->linear_name) != 0, named(effect, p->name));
             for (size_t j = 0; j < i; j++)
                 TEST_ASSERT_TRUE_MESSAGE(strcmp(p->name, effect->parameters[j].name) != 0, named(effect, p->name));
@@ -99,8 +117,10 @@ static void test_effects_parameters_have_sane_bounds(void)
             assert_bounds(sim_effects[e], p, p->linear_minimum, p->linear_maximum);
             bool next_is_phase = i + 1 < sim_effects[e]->parameter_count &&
                                  sim_effects[e]->parameters[i + 1].kind == sim_parameter_phase;
-            TEST_ASSERT_TRUE_MESSAGE((p->kind == sim_parameter_amplitude) == next_is_phase, named(sim_effects[e], p->name));
-            TEST_ASSERT_TRUE_MESSAGE(p->model_offset == SIZE_MAX || p->model_offset + sizeof(double) <= sizeof(struct sim_model),
+            TEST_ASSERT_TRUE_MESSAGE((p->kind == sim_parameter_amplitude) == next_is_phase,
+                                     named(sim_effects[e], p->name));
+            TEST_ASSERT_TRUE_MESSAGE(p->model_offset == SIZE_MAX ||
+                                         p->model_offset + sizeof(double) <= sizeof(struct sim_model),
                                      named(sim_effects[e], p->name));
         }
 }
@@ -120,10 +140,19 @@ static void test_effects_have_all_that_diagnosis_asks_for(void)
 
 static struct sim_coverage coverage_of(bool linear)
 {
-    return linear ? (struct sim_coverage){.position_span = 0.2, .velocity_rms = 0.1, .velocity_peak = 0.3, .torque_rms = 40.0,
-                                          .duration_s = 20.0, .frequency_max_hz = 50.0, .linear = true}
-                  : (struct sim_coverage){.position_span = 4.0, .velocity_rms = 6.0, .velocity_peak = 15.0, .torque_rms = 0.4,
-                                          .duration_s = 20.0, .frequency_max_hz = 100.0};
+    return linear ? (struct sim_coverage){.position_span = 0.2,
+                                          .velocity_rms = 0.1,
+                                          .velocity_peak = 0.3,
+                                          .torque_rms = 40.0,
+                                          .duration_s = 20.0,
+                                          .frequency_max_hz = 50.0,
+                                          .linear = true}
+                  : (struct sim_coverage){.position_span = 4.0,
+                                          .velocity_rms = 6.0,
+                                          .velocity_peak = 15.0,
+                                          .torque_rms = 0.4,
+                                          .duration_s = 20.0,
+                                          .frequency_max_hz = 100.0};
 }
 
 /// A model that lacks everything, or has some of everything that is part of a base model.
@@ -164,8 +193,8 @@ static void assert_scan(const struct sim_effect *effect, bool linear, bool full,
         for (size_t i = 0; i < effect->parameter_count; i++) {
             const struct sim_parameter *p = &effect->parameters[i];
             double low = linear ? p->linear_minimum : p->minimum, high = linear ? p->linear_maximum : p->maximum;
-            snprintf(message, sizeof message, "%s: scan value %zu of %s is %g (linear %d, full %d, %g Hz)", effect->id, index,
-                     p->name, values[i], linear, full, rate_hz);
+            snprintf(message, sizeof message, "%s: scan value %zu of %s is %g (linear %d, full %d, %g Hz)", effect->id,
+                     index, p->name, values[i], linear, full, rate_hz);
             TEST_ASSERT_TRUE_MESSAGE(values[i] >= low && values[i] <= high, message);
             // A search that starts at nothing goes nowhere: its steps are shares of where it starts.
             if (p->kind != sim_parameter_phase)
@@ -187,7 +216,8 @@ static void test_effects_scans_end_and_stay_within_the_bounds(void)
 }
 
 /// Sentences in which only one number changes: it has to be heard.
-static void say(const struct sim_effect *effect, bool linear, const double *values, double nominal, char *out, size_t size)
+static void say(const struct sim_effect *effect, bool linear, const double *values, double nominal, char *out,
+                size_t size)
 {
     const double deviations[sim_effect_parameters_max] = {1e-3, 2e-3, 3e-3, 4e-3};
     const double given[sim_effect_parameters_max] = {nominal, nominal, nominal, nominal};
@@ -219,7 +249,8 @@ static void test_effects_say_one_sentence_with_their_numbers(void)
                 assert_sentence(sim_effects[e], text);
                 values[0] *= 1.5;
                 say(sim_effects[e], linear, values, with_nominal ? 0.05 : 0.0, other, sizeof other);
-                TEST_ASSERT_TRUE_MESSAGE(strcmp(text, other) != 0, named(sim_effects[e], "deaf to its first parameter"));
+                TEST_ASSERT_TRUE_MESSAGE(strcmp(text, other) != 0,
+                                         named(sim_effects[e], "deaf to its first parameter"));
             }
 }
 
@@ -259,7 +290,8 @@ static void assert_reason(const struct sim_effect *effect, const char *why)
     TEST_ASSERT_NULL_MESSAGE(strstr(why, "nan"), named(effect, why));
 }
 
-/// A recording that covers hardly anything: whatever cannot show in it has to say why, and a good one shows most scan values.
+/// A recording that covers hardly anything: whatever cannot show in it has to say why, and a good one shows most scan
+/// values.
 static void test_effects_that_cannot_show_say_why(void)
 {
     size_t reasons = 0;
@@ -276,8 +308,10 @@ static void test_effects_that_cannot_show_say_why(void)
             TEST_ASSERT_TRUE(effect->scan(&model, &good, 0, values));
             char why[160] = "";
             if (effect->testable) {
-                TEST_ASSERT_TRUE_MESSAGE(effect->testable(values, &good, why, sizeof why), named(effect, "its own first scan value"));
-                TEST_ASSERT_FALSE_MESSAGE(effect->testable(values, &poor, why, sizeof why), named(effect, "testable in nothing"));
+                TEST_ASSERT_TRUE_MESSAGE(effect->testable(values, &good, why, sizeof why),
+                                         named(effect, "its own first scan value"));
+                TEST_ASSERT_FALSE_MESSAGE(effect->testable(values, &poor, why, sizeof why),
+                                          named(effect, "testable in nothing"));
                 assert_reason(effect, why);
                 reasons++;
             }

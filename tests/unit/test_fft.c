@@ -33,7 +33,8 @@ static void plan_for(size_t length)
 }
 
 /// Powers of two and other primes, primes themselves, and lengths as recordings have them.
-static const size_t lengths[] = {1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 16, 17, 25, 49, 60, 97, 128, 210, 343, 499, 1000, 1009, 1024, 2500};
+static const size_t lengths[] = {1,  2,  3,  4,  5,   6,   7,   8,   11,   13,   16,   17,
+                                 25, 49, 60, 97, 128, 210, 343, 499, 1000, 1009, 1024, 2500};
 enum { length_count = sizeof lengths / sizeof lengths[0] };
 
 static void fill(size_t n)

@@ -138,7 +138,7 @@ static void reference_zero_phase(const struct filter *filter, size_t n, size_t p
     static double wide[2][256];
     size_t length = n + 2 * pad;
     for (size_t i = 0; i < length; i++)
-        wide[0][i] = i < pad           ? 2.0 * x[0] - x[pad - i]
+        wide[0][i] = i < pad        ? 2.0 * x[0] - x[pad - i]
                      : i >= pad + n ? 2.0 * x[n - 1] - x[2 * n + pad - 2 - i]
                                     : x[i - pad];
     for (size_t pass = 0; pass < 2 * filter->sections; pass++) {

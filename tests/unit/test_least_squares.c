@@ -63,7 +63,8 @@ static void test_least_squares_residual_is_orthogonal_to_the_columns(void)
 
 static void test_least_squares_prior_pulls_by_its_weight(void)
 {
-    // One column of ones: rows b-s of 1 against one prior of weight w at c, the mean of all weighted: (n + w^2 c) / (n + w^2).
+    // One column of ones: rows b-s of 1 against one prior of weight w at c, the mean of all weighted: (n + w^2 c) / (n
+    // + w^2).
     const double weight = 5.0, centre = 4.0;
     double x, variance;
     for (size_t i = 0; i < rows; i++)
@@ -102,7 +103,8 @@ static void test_least_squares_empty_column_gives_zero_and_no_variance(void)
 
 static void test_least_squares_empty_column_with_prior_gives_the_prior(void)
 {
-    const double truth[columns] = {-2.0, 3e-4, 0.0}, weight[columns] = {0.0, 0.0, 0.5}, centre[columns] = {0.0, 0.0, 6.0};
+    const double truth[columns] = {-2.0, 3e-4, 0.0}, weight[columns] = {0.0, 0.0, 0.5},
+                 centre[columns] = {0.0, 0.0, 6.0};
     double x[columns], covariance[columns * columns];
     for (size_t i = 0; i < rows; i++)
         A[2 * rows + i] = 0.0;
@@ -119,7 +121,8 @@ static void test_least_squares_refuses_dependent_columns_and_leaves_the_outputs(
         double x[columns] = {11.0, 12.0, 13.0}, covariance[columns * columns] = {14.0};
         for (size_t i = 0; i < rows; i++)
             A[2 * rows + i] = A[rows + i] * (double)k / 7.0 - A[i] * 0.3 * (double)k;
-        TEST_ASSERT_FALSE_MESSAGE(least_squares_solve(rows, columns, A, b, NULL, NULL, x, covariance), "dependent columns");
+        TEST_ASSERT_FALSE_MESSAGE(least_squares_solve(rows, columns, A, b, NULL, NULL, x, covariance),
+                                  "dependent columns");
         TEST_ASSERT_EQUAL_DOUBLE(11.0, x[0]);
         TEST_ASSERT_EQUAL_DOUBLE(13.0, x[2]);
         TEST_ASSERT_EQUAL_DOUBLE(14.0, covariance[0]);
@@ -177,7 +180,8 @@ static void test_least_squares_covariance_is_the_scatter_of_estimates(void)
     for (size_t i = 0; i < columns; i++)
         for (size_t j = 0; j < columns; j++) {
             double scale = sqrt(covariance[i * columns + i] * covariance[j * columns + j]);
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(chance, covariance[i * columns + j] / scale, sums[i * columns + j] / scale, message);
+            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(chance, covariance[i * columns + j] / scale,
+                                              sums[i * columns + j] / scale, message);
             TEST_ASSERT_EQUAL_DOUBLE(covariance[i * columns + j], covariance[j * columns + i]);
         }
 }

@@ -154,7 +154,8 @@ static void test_model_check_refuses_parameters_of_effects_out_of_their_bounds(v
             TEST_ASSERT_NULL(check());
             model.effect_on[e] = true;
             for (size_t i = 0; i < effect->parameter_count; i++)
-                model.effect_parameters[e][i] = linear ? effect->parameters[i].linear_minimum : effect->parameters[i].minimum;
+                model.effect_parameters[e][i] =
+                    linear ? effect->parameters[i].linear_minimum : effect->parameters[i].minimum;
             TEST_ASSERT_NULL_MESSAGE(check(), effect->id);
             for (size_t i = 0; i < effect->parameter_count; i++) {
                 const struct sim_parameter *p = &effect->parameters[i];

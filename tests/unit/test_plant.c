@@ -185,18 +185,23 @@ static double total_energy(void)
 
 static void test_plant_two_masses_keep_momentum_and_energy(void)
 {
-    two_masses(500.0, 0.0);
-    plant.velocity = 2.0;
-    plant.load_velocity = 1.0;
-    double momentum = 0.004 * 2.0 + 0.007 * 1.0, energy = total_energy();
-    double rate = sqrt(500.0 * (1.0 / 0.004 + 1.0 / 0.007));
-    move(0.0, 250e-6, 8000);
-    TEST_ASSERT_DOUBLE_WITHIN(rounding * momentum, momentum,
-                              0.004 * plant.velocity + 0.007 * plant.load_velocity);
-    // The integration may damp the swing like a damping ratio of 1e-5: a hundredth of what belts have at the least.
-    double most_lost = -expm1(-2.0 * 1e-5 * rate * 2.0);
-    TEST_ASSERT_TRUE(total_energy() <= energy * (1.0 + 1e-9));
-    TEST_ASSERT_TRUE(total_energy() >= energy * (1.0 - most_lost));
+    // The second belt swings so fast that a substep is divided into inner steps.
+    static const double stiffnesses[] = {500.0, 2e5};
+    for (size_t i = 0; i < 2; i++) {
+        two_masses(stiffnesses[i], 0.0);
+        sim_plant_init(&plant, 0.0);
+        plant.velocity = 2.0;
+        plant.load_velocity = 1.0;
+        double momentum = 0.004 * 2.0 + 0.007 * 1.0, energy = total_energy();
+        double rate = sqrt(stiffnesses[i] * (1.0 / 0.004 + 1.0 / 0.007));
+        move(0.0, 250e-6, 2000);
+        TEST_ASSERT_DOUBLE_WITHIN(rounding * momentum, momentum, 0.004 * plant.velocity + 0.007 * plant.load_velocity);
+        // The integration may damp the swing like a damping ratio of 1e-5: a hundredth of what belts have at the least.
+        double swing = 0.5 * 0.004 * 0.007 / 0.011;
+        double most_lost = -swing * expm1(-2.0 * 1e-5 * rate * 0.5);
+        TEST_ASSERT_TRUE(total_energy() <= energy * (1.0 + 1e-9));
+        TEST_ASSERT_TRUE(total_energy() >= energy - most_lost);
+    }
 }
 
 // ---- Two masses
@@ -331,7 +336,8 @@ static void test_plant_cogging_is_a_cosine_of_the_angle_or_of_the_travel(void)
         TEST_ASSERT_DOUBLE_WITHIN(1e-13, 0.05 * cos(two_pi * x / 0.024 + 0.8), opposing_smooth(x));
 }
 
-/// Without friction the energy put into a cogging torque's potential comes back: v^2 J / 2 + (a / n) sin(n x + p) stays.
+/// Without friction the energy put into a cogging torque's potential comes back: v^2 J / 2 + (a / n) sin(n x + p)
+/// stays.
 static void test_plant_cogging_stores_and_returns_energy(void)
 {
     switch_on("cogging", 0.05, 0.8, 12.0);
@@ -367,7 +373,8 @@ static void test_plant_error_falls_with_the_fourth_power_of_the_step_without_rev
     switch_on("cogging", 0.05, 0.8, 20.0);
     double finest = position_after(4e-3, 200, 64, 0.002);
     TEST_ASSERT_TRUE(plant.velocity > 1.0);
-    double coarse = fabs(position_after(4e-3, 200, 1, 0.002) - finest), fine = fabs(position_after(4e-3, 200, 2, 0.002) - finest);
+    double coarse = fabs(position_after(4e-3, 200, 1, 0.002) - finest),
+           fine = fabs(position_after(4e-3, 200, 2, 0.002) - finest);
     TEST_ASSERT_TRUE(coarse > 1e-9);
     TEST_ASSERT_TRUE_MESSAGE(fine < coarse / 12.0, "halving the step has to divide the error by nearly sixteen");
 }

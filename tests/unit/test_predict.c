@@ -83,10 +83,17 @@ static void run_drive(void)
         position[n] = sample.position;
         velocity[n] = sample.velocity;
     }
-    all = (struct stretch){.samples = rows, .torque_ref = torque_ref, .torque = torque, .position = position,
-                           .velocity = velocity, .substeps = sim_substeps};
-    last_period = (struct stretch){.samples = period, .torque_ref = torque_ref + rows - period, .torque = torque + rows - period,
-                                   .position = position + rows - period, .velocity = velocity + rows - period,
+    all = (struct stretch){.samples = rows,
+                           .torque_ref = torque_ref,
+                           .torque = torque,
+                           .position = position,
+                           .velocity = velocity,
+                           .substeps = sim_substeps};
+    last_period = (struct stretch){.samples = period,
+                                   .torque_ref = torque_ref + rows - period,
+                                   .torque = torque + rows - period,
+                                   .position = position + rows - period,
+                                   .velocity = velocity + rows - period,
                                    .substeps = sim_substeps};
 }
 
@@ -205,8 +212,8 @@ static void test_predict_from_measured_torque_alone_is_right_where_torque_is_slo
             sim_plant_step(&plant, &model, 0.3 * sin(w * (t + ((double)i + 0.5) / (fine * model.sample_rate_hz))),
                            1.0 / (fine * model.sample_rate_hz));
     }
-    struct stretch stretch = {.samples = period, .torque = torque, .position = position, .velocity = velocity,
-                              .substeps = sim_substeps};
+    struct stretch stretch = {
+        .samples = period, .torque = torque, .position = position, .velocity = velocity, .substeps = sim_substeps};
     predict(&model, &stretch, false, 0.005, mechanics, NULL);
     // A straight line is off from the sinusoid by (w dt)^2 / 8 of its size at most; where the motor reverses and breaks
     // away, by what torque changes meanwhile, w dt of its size.

@@ -36,8 +36,8 @@ static const double velocity_limit_m_per_s = 0.05;
 static const double torque_limit_Nm = 1.0;
 static const char lines_specification[] = "linear:0.5:100:0.5";
 
-/// Two excitations of the same axis: other methods, other phases.
-static const char *const methods[demo_runs] = {"fast", "mca"};
+/// Two excitations of the same axis: other methods, other phases, another level.
+static const char *const methods[demo_runs] = {"fast", "clip"};
 
 struct demo {
     const char *folder;

@@ -3,7 +3,10 @@
 #include "lab/design/lines.h"
 #include "lab/estimate/method.h"
 #include "lab/estimate/periodic.h"
+#include "lab/estimate/report.h"
 #include "lab/numeric/statistics.h"
+#include "lab/page/page.h"
+#include "lab/record/atomic_file.h"
 #include "lab/record/frf_file.h"
 #include "lab/record/json_out.h"
 #include "lab/record/run.h"
@@ -25,6 +28,7 @@ struct arguments {
     const char *lines;
     const char *map;
     const char *out;
+    const char *report;
     double rate_hz;
     long long period_samples;
 };
@@ -57,6 +61,7 @@ static int read_options(int argc, char **argv, struct arguments *out, struct err
         {.name = "rate", .kind = option_positive, .target = &out->rate_hz},
         {.name = "period", .kind = option_integer, .target = &out->period_samples, .lowest = 3, .highest = 1e9},
         {.name = "out", .kind = option_text, .target = &out->out, .required = true},
+        {.name = "report", .kind = option_text, .target = &out->report},
     };
     const struct option_operands operands = {"RUN.csv", 1, option_values_max, &out->runs};
     return options_parse(argc, argv, options, sizeof options / sizeof options[0], &operands, out_error);
@@ -273,10 +278,27 @@ static int print_json(const struct arguments *arguments, const struct frf *frf, 
     return status;
 }
 
+static int write_page(const char *path, const struct frf *frf, struct error *out_error)
+{
+    struct atomic_file file;
+    struct page page;
+    FILE *stream = atomic_file_open(&file, path, out_error);
+    if (!stream) {
+        return error_refused;
+    }
+    page_start(&page, stream, "Frequency response", NULL);
+    frf_report_section(&page, frf, NULL);
+    page_end(&page, NULL);
+    return atomic_file_commit(&file, out_error);
+}
+
 static int write_and_report(const struct arguments *arguments, const struct frf *frf, const struct summary *runs,
                             const struct command_context *context, struct error *out_error)
 {
     int status = frf_write(arguments->out, frf, out_error);
+    if (!status && arguments->report) {
+        status = write_page(arguments->report, frf, out_error);
+    }
     if (status) {
         return status;
     }
@@ -362,6 +384,7 @@ const struct command command_cmd_frf = {
             "                       by their power)\n"
             "  --map NAME=COLUMN[*SCALE],...  --rate HZ    for recordings of others\n"
             "  --out FRF.csv        frequency_hz,real,imag,std,noise_std,...,valid\n"
+            "  --report FILE.html   a page: Bode diagram with its uncertainty\n"
             "\n"
             "Several runs are realisations: same lines, other phases. Their mean is the best linear approximation, std "
             "its total\n"

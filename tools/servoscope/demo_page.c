@@ -23,18 +23,37 @@ static bool is_found(const struct demo_page *self)
     return self->diagnosis->cause_count == 1 && self->diagnosis->causes[0].effect == self->hiding->effect;
 }
 
+/// What was found, in the words in which hiding_describe tells what was hidden.
+static void describe_found(const struct diagnosis *d, char out_text[wording_size])
+{
+    size_t used = 0;
+    out_text[0] = '\0';
+    for (size_t c = 0; c < d->cause_count && used < wording_size; c++) {
+        const struct sim_effect *effect = sim_effects[d->causes[c].effect];
+        used += (size_t)snprintf(out_text + used, wording_size - used, "%s%s:", c > 0 ? "; " : "", effect->id);
+        for (size_t i = 0; i < effect->parameter_count && used < wording_size; i++) {
+            char estimate[2 * wording_short];
+            wording_estimate(d->causes[c].values[i], d->causes[c].deviations[i], estimate);
+            used += (size_t)snprintf(out_text + used, wording_size - used, "%s %s %s", i > 0 ? "," : "",
+                                     effect->parameters[i].name, estimate);
+        }
+    }
+    if (d->cause_count == 0) {
+        wording_headline(d, out_text);
+    }
+}
+
 static void add_story(struct page *page, const struct demo_page *self)
 {
-    const struct diagnosis *d = self->diagnosis;
-    char hidden[wording_size], headline[wording_size];
+    char hidden[wording_size], found[wording_size];
     hiding_describe(self->hiding, sizeof hidden, hidden);
-    wording_headline(d, headline);
+    describe_found(self->diagnosis, found);
     page_add_paragraph(page,
                        "A simulated belt drive was measured over a CAN bus inside the program. One thing in it differs "
                        "from the model that is believed (nominal.json); the diagnosis below was not told which.");
     page_add_note(page, is_found(self) ? page_good : page_warning,
                   is_found(self) ? "What was hidden was found" : "What was hidden and what was found differ",
-                  "Hidden: %s. Found: %s", hidden, d->cause_count == 1 ? d->causes[0].says : headline);
+                  "Hidden: %s. Found: %s.", hidden, found);
 }
 
 static double peak_of(const struct run *run, const char *column)
@@ -53,7 +72,7 @@ static void add_measurement(struct page *page, const struct demo_page *self)
     page_add_section(page, "Measurement");
     page_add_paragraph(page,
                        "Cyclic synchronous position with velocity and torque feed-forward (CiA 402), the table as "
-                       "position reference. The second run has other phases and other noise.");
+                       "position reference. The second run has other phases, another level and other noise.");
     page_start_pairs(page);
     page_add_pair(page, "periods", "%zu to settle, %zu counted, of %zu samples at %g Hz", run->settle_periods,
                   run->periods, run->period_samples, run->sample_rate_hz);

@@ -44,7 +44,7 @@ static double *model_field(struct sim_model *model, const struct sim_parameter *
 /// what will be hidden, the nominal model is without it.
 static void make_nominal(const struct sim_effect *effect, uint64_t seed, struct sim_model *out)
 {
-    const double antiresonance_hz = 62.0, damping_ratio = 0.04;
+    const double antiresonance_hz = 66.0, damping_ratio = 0.04;
     sim_model_default(out);
     out->seed = seed;
     out->load_inertia_kgm2 = 0.00266;
@@ -64,6 +64,15 @@ static void make_nominal(const struct sim_effect *effect, uint64_t seed, struct 
 
 // ---- What a table lets show
 
+static double peak_of(const double *values, size_t count)
+{
+    double peak = 0.0;
+    for (size_t n = 0; n < count; n++) {
+        peak = fmax(peak, fabs(values[n]));
+    }
+    return peak;
+}
+
 static bool cover(const struct sim_model *nominal, const struct msgen_table *table, struct sim_coverage *out)
 {
     struct error ignored;
@@ -74,18 +83,17 @@ static bool cover(const struct sim_model *nominal, const struct msgen_table *tab
     const double *torque = run_column(&run, "torque_Nm");
     const double *position = run_column(&run, "position_rad");
     const double *velocity = run_column(&run, "velocity_rad_per_s");
-    double low = position[0], high = position[0], torque_sum = 0.0, velocity_sum = 0.0, peak = 0.0;
+    double low = position[0], high = position[0], torque_sum = 0.0, velocity_sum = 0.0;
     for (size_t n = 0; n < run.rows; n++) {
         low = fmin(low, position[n]);
         high = fmax(high, position[n]);
         torque_sum += torque[n] * torque[n];
         velocity_sum += velocity[n] * velocity[n];
-        peak = fmax(peak, fabs(velocity[n]));
     }
     *out = (struct sim_coverage){
         .position_span = high - low,
         .velocity_rms = sqrt(velocity_sum / (double)run.rows),
-        .velocity_peak = peak,
+        .velocity_peak = peak_of(velocity, run.rows),
         .torque_rms = sqrt(torque_sum / (double)run.rows),
         .duration_s = (double)run.rows / run.sample_rate_hz,
         .frequency_max_hz = run.bins[run.bin_count - 1] * run.sample_rate_hz / (double)run.period_samples,
@@ -125,10 +133,11 @@ static double missed_squares(const struct sim_model *model, const struct run *ru
 }
 
 /// Share of the torque that the nominal model misses on the drive's own noise-free motion; negative if the drive cannot
-/// follow.
+/// follow, or only at speeds far beyond what the excitation was designed for.
 static double missed_share(const struct sim_model *nominal, const struct sim_model *drive,
-                           const struct msgen_table *table)
+                           const struct msgen_table *table, const struct sim_coverage *coverage)
 {
+    const double speed_excess_max = 1.25;
     struct error ignored;
     struct run run;
     if (quiet_run(drive, table, &run, &ignored)) {
@@ -140,7 +149,9 @@ static double missed_share(const struct sim_model *nominal, const struct sim_mod
     for (size_t n = first; n < run.rows; n++) {
         all += torque[n] * torque[n];
     }
-    const double share = sqrt(missed_squares(nominal, &run, first) / all);
+    const double fastest = peak_of(run_column(&run, "velocity_rad_per_s"), run.rows);
+    const bool follows = fastest < speed_excess_max * coverage->velocity_peak;
+    const double share = follows ? sqrt(missed_squares(nominal, &run, first) / all) : -1.0;
     run_free(&run);
     return share;
 }
@@ -233,7 +244,8 @@ static bool draw(const struct sim_coverage *coverage, uint64_t random[4], struct
 
 /// What the nominal model has nothing of begins at what can just be seen: brought to a share of the torque, to which it
 /// is nearly proportional, and given a sign.
-static void size_addition(const struct msgen_table *table, uint64_t random[4], struct hiding *io)
+static void size_addition(const struct msgen_table *table, const struct sim_coverage *coverage, uint64_t random[4],
+                          struct hiding *io)
 {
     const struct sim_parameter *parameter = &sim_effects[io->effect]->parameters[0];
     const double wanted = log_uniform(random, added_share_low, added_share_high);
@@ -242,7 +254,7 @@ static void size_addition(const struct msgen_table *table, uint64_t random[4], s
         return;
     }
     for (int step = 0; step < 3; step++) {
-        const double share = missed_share(&io->nominal_model, &io->drive_model, table);
+        const double share = missed_share(&io->nominal_model, &io->drive_model, table, coverage);
         if (!(share > 0.0)) {
             return;
         }
@@ -267,8 +279,8 @@ static bool hide(int index, uint64_t seed, uint64_t random[4], const struct msge
         if (!draw(&coverage, random, out) || sim_model_check(&out->drive_model, text, sizeof text)) {
             continue;
         }
-        size_addition(table, random, out);
-        out->torque_share = missed_share(&out->nominal_model, &out->drive_model, table);
+        size_addition(table, &coverage, random, out);
+        out->torque_share = missed_share(&out->nominal_model, &out->drive_model, table, &coverage);
         if (out->torque_share >= share_min && out->torque_share <= share_max && !is_damage(out, &coverage)) {
             return true;
         }

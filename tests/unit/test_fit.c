@@ -1,0 +1,250 @@
+/* SPDX-License-Identifier: MIT */
+/// Fits to runs of the simulated drive whose truth and noise are known.
+#include "lab/diagnose/fit.h"
+
+#include "lab/numeric/statistics.h"
+#include "sim/belt_drive.h"
+#include "unity.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { samples = 512, periods = 10, lead = 3 * samples, rows = lead + samples * periods };
+
+static const double two_pi = 6.283185307179586;
+
+static struct sim_model truth, given;
+static struct recording recording;
+static struct evidence evidence;
+static struct fit_data data;
+static struct fit fit;
+static struct hypothesis hypothesis;
+static double columns[4][rows], block[4][samples];
+
+void setUp(void)
+{
+    sim_model_default(&truth);
+    truth.sensors = (struct sim_sensors){.velocity_noise_rad_per_s = 5e-3, .torque_noise_Nm = 3e-3};
+    truth.motor_inertia_kgm2 = 0.004;
+    truth.load_inertia_kgm2 = 0.001;
+    truth.viscous_friction_Nms_per_rad = 0.004;
+    truth.coulomb_friction_Nm = 0.03;
+    truth.torque_lag_s = 6e-4;
+    given = truth;
+}
+
+void tearDown(void)
+{
+    fit_free(&fit);
+    evidence_free(&evidence);
+}
+
+/// Runs the true drive on a multisine and prepares all up to a fit; the noise is judged under the true model.
+static void record(uint64_t seed)
+{
+    static struct sim_belt_drive drive;
+    truth.seed = seed;
+    sim_belt_drive_init(&drive, &truth, 0.0);
+    for (size_t n = 0; n < rows; n++) {
+        struct sim_command command = {.control = sim_control_cascade};
+        for (int line = 1; line <= 40; line += 3) {
+            double w = two_pi * line * truth.sample_rate_hz / samples, angle = w * (double)n / truth.sample_rate_hz;
+            command.position += 3.0 / w * sin(angle + line * line);
+            command.velocity += 3.0 * cos(angle + line * line);
+        }
+        struct sim_sample sample;
+        sim_belt_drive_step(&drive, &command, &sample);
+        columns[0][n] = sample.torque_ref;
+        columns[1][n] = sample.torque;
+        columns[2][n] = sample.position;
+        columns[3][n] = sample.velocity;
+    }
+    memset(block, 0, sizeof block);
+    for (size_t c = 0; c < 4; c++)
+        for (size_t n = lead; n < rows; n++)
+            block[c][(n - lead) % samples] += columns[c][n] / periods;
+    recording = (struct recording){
+        .periodic = true, .rate_hz = truth.sample_rate_hz, .periods = periods, .lead = lead, .band = 60};
+    recording.block = (struct stretch){.samples = samples,
+                                       .torque_ref = block[0],
+                                       .torque = block[1],
+                                       .position = block[2],
+                                       .velocity = block[3],
+                                       .substeps = sim_substeps};
+    recording.all = (struct stretch){.samples = rows,
+                                     .torque_ref = columns[0],
+                                     .torque = columns[1],
+                                     .position = columns[2],
+                                     .velocity = columns[3],
+                                     .substeps = sim_substeps};
+    TEST_ASSERT_TRUE(evidence_init(&evidence, &recording, 0.005));
+    TEST_ASSERT_TRUE(evidence_estimate_noise(&evidence, &truth));
+    data = (struct fit_data){.runs = 1, .evidence = &evidence, .values = evidence.values};
+    TEST_ASSERT_TRUE(fit_init(&fit, &data));
+}
+
+static int name(const char *id, double value)
+{
+    int effect = sim_effect_find(id);
+    TEST_ASSERT_TRUE_MESSAGE(effect >= 0, id);
+    hypothesis_name(&hypothesis, effect, &value);
+    return effect;
+}
+
+static void test_fit_finds_a_friction_that_the_given_model_has_wrong(void)
+{
+    record(1);
+    given.viscous_friction_Nms_per_rad = 0.002;
+    hypothesis_init(&hypothesis, &given, false, true);
+    double before = fit_cost(&fit, &data, &hypothesis, hypothesis.x);
+    int effect = name("viscous_friction", 0.002);
+    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 10));
+    double value, deviation;
+    hypothesis_parameters(&hypothesis, effect, fit.covariance, &value, &deviation);
+    TEST_ASSERT_TRUE(deviation > 0.0 && deviation < 1e-4);
+    TEST_ASSERT_DOUBLE_WITHIN(5.0 * deviation, 0.004, value);
+    TEST_ASSERT_TRUE(fit.cost < before - 100.0);
+    // A right model leaves noise: one a value, with the scatter of the noise estimated from so few periods.
+    TEST_ASSERT_DOUBLE_WITHIN(0.4, 1.0, fit.cost / (double)data.values);
+}
+
+static void test_fit_cost_is_the_sum_of_squares_and_priors(void)
+{
+    record(2);
+    hypothesis_init(&hypothesis, &given, false, true);
+    hypothesis.x[0] = 0.003;
+    double cost = fit_cost(&fit, &data, &hypothesis, hypothesis.x), sum = 0.0, prior = 0.0;
+    struct sim_model model;
+    double *residual = malloc(data.values * sizeof *residual);
+    TEST_ASSERT_NOT_NULL(residual);
+    hypothesis_model(&hypothesis, NULL, &model);
+    fit_residual(&data, &model, residual);
+    for (size_t i = 0; i < data.values; i++) {
+        sum += residual[i] * residual[i];
+        TEST_ASSERT_EQUAL_DOUBLE(residual[i], fit.residual[i]);
+    }
+    free(residual);
+    for (size_t i = 0; i < hypothesis.count; i++)
+        prior += pow(hypothesis.coordinates[i].weight * (hypothesis.x[i] - hypothesis.coordinates[i].centre), 2);
+    TEST_ASSERT_TRUE(prior > 0.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * prior, prior, fit.prior);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * cost, sum + prior, cost);
+}
+
+static void test_fit_stays_within_its_boxes_and_gives_no_deviation_at_a_wall(void)
+{
+    record(3);
+    given.coulomb_friction_Nm = 0.02; // the truth is half as large again: the box of an unnamed number ends far before
+    hypothesis_init(&hypothesis, &given, false, true);
+    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 10));
+    bool found = false;
+    for (size_t i = 0; i < hypothesis.count; i++) {
+        const struct coordinate *c = &hypothesis.coordinates[i];
+        TEST_ASSERT_TRUE(hypothesis.x[i] >= c->lower && hypothesis.x[i] <= c->upper);
+        if (c->model_offset == offsetof(struct sim_model, coulomb_friction_Nm)) {
+            found = true;
+            TEST_ASSERT_EQUAL_DOUBLE(c->upper, hypothesis.x[i]);
+            TEST_ASSERT_EQUAL_DOUBLE(0.0, fit.covariance[i * hypothesis.count + i]);
+        }
+    }
+    TEST_ASSERT_TRUE(found);
+}
+
+static void test_fit_never_makes_it_worse(void)
+{
+    record(4);
+    static const double starts[] = {1e-4, 0.01, 0.2};
+    for (size_t i = 0; i < sizeof starts / sizeof starts[0]; i++) {
+        hypothesis_init(&hypothesis, &given, false, true);
+        name("coulomb_friction", starts[i]);
+        double before = fit_cost(&fit, &data, &hypothesis, hypothesis.x);
+        for (size_t iterations = 1; iterations <= 4; iterations++) {
+            TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, iterations));
+            TEST_ASSERT_TRUE(fit.cost <= before);
+            before = fit.cost;
+            TEST_ASSERT_DOUBLE_WITHIN(1e-9 * before, before, fit_cost(&fit, &data, &hypothesis, hypothesis.x));
+        }
+    }
+}
+
+static void test_fit_step_with_borrowed_derivatives_is_the_first_step_of_a_fit(void)
+{
+    record(5);
+    given.viscous_friction_Nms_per_rad = 0.0;
+    hypothesis_init(&hypothesis, &given, false, true);
+    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 6));
+    struct hypothesis stepped = hypothesis, whole;
+    double value = 0.003;
+    hypothesis_name(&stepped, sim_effect_find("viscous_friction"), &value);
+    whole = stepped;
+    struct fit step = {0};
+    TEST_ASSERT_TRUE(fit_init(&step, &data));
+    double start = fit_cost(&step, &data, &stepped, stepped.x);
+    TEST_ASSERT_TRUE(fit_step(&step, &data, &hypothesis, &fit, &stepped));
+    double cost = step.cost;
+    TEST_ASSERT_TRUE(fit_run(&step, &data, &whole, 6));
+    double best = step.cost;
+    fit_free(&step);
+    // The model is nearly linear in friction: one step gets nearly all of the way.
+    TEST_ASSERT_TRUE(best < start - 1000.0);
+    TEST_ASSERT_TRUE(start - cost > 0.99 * (start - best));
+}
+
+/// A given model whose numbers are off by as much as its priors say.
+static void draw_given(struct random *random)
+{
+    hypothesis_init(&hypothesis, &truth, false, true);
+    for (size_t i = 0; i < hypothesis.count; i++) {
+        const struct coordinate *c = &hypothesis.coordinates[i];
+        double off = random_normal(random) / c->weight;
+        hypothesis.x[i] = fmin(fmax(off, 0.9 * c->lower), 0.9 * c->upper);
+    }
+    hypothesis_model(&hypothesis, NULL, &given);
+}
+
+/// Over fresh noise and fresh errors of the given model the estimates scatter as their deviations say: chi-square.
+static void assert_deviations(const char *id, double start, double expected)
+{
+    enum { draws = 16 };
+    const uint64_t seed = 100;
+    double sum = 0.0;
+    char message[120];
+    struct random random;
+    random_seed(&random, seed);
+    for (uint64_t d = 0; d < draws; d++) {
+        record(seed + d);
+        draw_given(&random);
+        hypothesis_init(&hypothesis, &given, false, true);
+        int effect = name(id, start);
+        TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 8));
+        double value, deviation;
+        hypothesis_parameters(&hypothesis, effect, fit.covariance, &value, &deviation);
+        sum += pow((value - expected) / deviation, 2);
+        tearDown();
+    }
+    snprintf(message, sizeof message, "%s, seeds %u..%u: chi-square %g of %d", id, (unsigned)seed,
+             (unsigned)(seed + draws - 1), sum, draws);
+    // Chance leaves these bounds once in a thousand; the noise, known from ten periods only, makes them a little wider.
+    TEST_ASSERT_TRUE_MESSAGE(sum < 1.25 * statistics_chi2_quantile(0.9995, draws), message);
+    TEST_ASSERT_TRUE_MESSAGE(sum > statistics_chi2_quantile(0.0005, draws), message);
+}
+
+static void test_fit_deviations_are_the_scatter_over_fresh_noise(void)
+{
+    assert_deviations("viscous_friction", 0.003, truth.viscous_friction_Nms_per_rad);
+    assert_deviations("coulomb_friction", 0.02, truth.coulomb_friction_Nm);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_fit_finds_a_friction_that_the_given_model_has_wrong);
+    RUN_TEST(test_fit_cost_is_the_sum_of_squares_and_priors);
+    RUN_TEST(test_fit_stays_within_its_boxes_and_gives_no_deviation_at_a_wall);
+    RUN_TEST(test_fit_never_makes_it_worse);
+    RUN_TEST(test_fit_step_with_borrowed_derivatives_is_the_first_step_of_a_fit);
+    RUN_TEST(test_fit_deviations_are_the_scatter_over_fresh_noise);
+    return UNITY_END();
+}
