@@ -11,7 +11,7 @@ limits=(--rate 1000 --period 2000 --lines linear:0.5:100:0.5 --limit-torque 1 --
     --inertia 0.00516)
 printf '%-12s %-11s %12s %16s %8s %8s\n' method grid 'torque [Nm]' 'every t [Nm]' crest 'cpu [s]'
 for grid in samples continuous; do
-    for method in newman schroeder 'clip --keep all' mca linf fast; do
+    for method in newman schroeder 'clip --keep all' mca fast; do
         # shellcheck disable=SC2086
         "$SERVOSCOPE" design "${limits[@]}" --grid "$grid" --method $method --json "$@" --out "$folder/table" >"$folder/json" ||
             continue

@@ -47,7 +47,8 @@ static double filtered_velocity(struct sim_belt_drive *self, double velocity)
 {
     double filter_s = self->model->sensors.velocity_filter_s;
     if (filter_s > 0.0)
-        self->velocity_filtered += (velocity - self->velocity_filtered) * -expm1(-1.0 / (self->model->sample_rate_hz * filter_s));
+        self->velocity_filtered +=
+            (velocity - self->velocity_filtered) * -expm1(-1.0 / (self->model->sample_rate_hz * filter_s));
     else
         self->velocity_filtered = velocity;
     return self->velocity_filtered;
@@ -84,10 +85,9 @@ static double control(struct sim_belt_drive *self, const struct sim_command *com
         torque = command->torque;
         break;
     case sim_control_cascade:
-        torque = velocity_control(self,
-                                  c->position_gain_per_s * (command->position - position) +
-                                      c->velocity_feedforward * command->velocity,
-                                  velocity, c->torque_feedforward * command->torque);
+        torque = velocity_control(
+            self, c->position_gain_per_s * (command->position - position) + c->velocity_feedforward * command->velocity,
+            velocity, c->torque_feedforward * command->torque);
         break;
     case sim_control_stop:
         self->stop_velocity -= clipped(self->stop_velocity, slope);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// The simulated drive: plant, actuator, cascade of position, velocity and torque control, sensors. One call is one sample.
-/// No clock: time is the number of calls. Same model and seed, same run, bit for bit.
+/// The simulated drive: plant, actuator, cascade of position, velocity and torque control, sensors. One call is one
+/// sample. No clock: time is the number of calls. Same model and seed, same run, bit for bit.
 #ifndef SERVOSCOPE_SIM_BELT_DRIVE_H
 #define SERVOSCOPE_SIM_BELT_DRIVE_H
 
@@ -19,17 +19,17 @@ enum sim_control {
 
 struct sim_command {
     enum sim_control control;
-    double position;        ///< rad or m
-    double velocity;        ///< rad/s or m/s
-    double torque;          ///< Nm or N
+    double position; ///< rad or m
+    double velocity; ///< rad/s or m/s
+    double torque;   ///< Nm or N
 };
 
 struct sim_sample {
-    double torque_ref;      ///< asked for from this sample on
-    double torque;          ///< measured motor torque at the sampling instant
-    double position;        ///< measured
-    double velocity;        ///< measured
-    double load_position;   ///< measured at the load, by an encoder of its own; rigid: of the motor's position
+    double torque_ref;    ///< asked for from this sample on
+    double torque;        ///< measured motor torque at the sampling instant
+    double position;      ///< measured
+    double velocity;      ///< measured
+    double load_position; ///< measured at the load, by an encoder of its own; rigid: of the motor's position
 };
 
 struct sim_belt_drive {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/// An effect: one physical cause by which a drive differs from a simpler model of it. One file in sim/effects/ each, with one
-/// object `sim_effect_NAME`; the build collects them. The plant calls the hooks of the effects that a model has switched on;
-/// diagnosis reads the parameters' bounds and scan values. Nobody else knows an effect by name.
+/// An effect: one physical cause by which a drive differs from a simpler model of it. One file in sim/effects/ each,
+/// with one object `sim_effect_NAME`; the build collects them. The plant calls the hooks of the effects that a model
+/// has switched on; diagnosis reads the parameters' bounds and scan values. Nobody else knows an effect by name.
 #ifndef SERVOSCOPE_SIM_EFFECT_H
 #define SERVOSCOPE_SIM_EFFECT_H
 
@@ -20,26 +20,26 @@ struct sim_motion {
 
 /// What the motor has to overcome at one instant. Torques in Nm, or forces in N; positive ones oppose positive speed.
 struct sim_opposing {
-    double smooth;       ///< bias, cogging: a function of motion, no friction
-    double viscous;      ///< friction that vanishes with speed
-    double dry;          ///< friction magnitude that does not: Coulomb, Stribeck; >= 0
+    double smooth;          ///< bias, cogging: a function of motion, no friction
+    double viscous;         ///< friction that vanishes with speed
+    double dry;             ///< friction magnitude that does not: Coulomb, Stribeck; >= 0
     double positive_factor; ///< on all friction for motion in each direction, 1 without asymmetry
     double negative_factor;
 };
 
 /// How diagnosis moves a parameter.
 enum sim_parameter_kind {
-    sim_parameter_linear,   ///< as it is, within its bounds
-    sim_parameter_positive, ///< on a logarithmic scale
+    sim_parameter_linear,    ///< as it is, within its bounds
+    sim_parameter_positive,  ///< on a logarithmic scale
     sim_parameter_amplitude, ///< with the following sim_parameter_phase: as cosine and sine parts
     sim_parameter_phase,
 };
 
 struct sim_parameter {
-    const char *name;         ///< rotary, unit at the end: amplitude_Nm
-    const char *linear_name;  ///< the twin on a linear axis: amplitude_N
+    const char *name;        ///< rotary, unit at the end: amplitude_Nm
+    const char *linear_name; ///< the twin on a linear axis: amplitude_N
     enum sim_parameter_kind kind;
-    double minimum, maximum;  ///< physical bounds, rotary units
+    double minimum, maximum; ///< physical bounds, rotary units
     double linear_minimum, linear_maximum;
     /// For effects that are parameters of the base model: offset of the double in struct sim_model; else SIZE_MAX.
     size_t model_offset;
@@ -58,9 +58,9 @@ struct sim_model;
 
 /// What a recording covered, for scan values and for whether an effect can show in it at all.
 struct sim_coverage {
-    double position_span;  ///< largest minus smallest position, rad or m
+    double position_span; ///< largest minus smallest position, rad or m
     double velocity_rms, velocity_peak;
-    double torque_rms;     ///< Nm or N
+    double torque_rms; ///< Nm or N
     double duration_s;
     double frequency_max_hz; ///< highest excited line
     bool linear;
@@ -86,10 +86,12 @@ struct sim_effect {
     /// Whether diagnosis may ask for the effect on top of this model at all; NULL: always.
     bool (*applies)(const struct sim_model *model);
     /// Starting values number `index` for a search, rotary or linear as the model; false past the last one.
-    bool (*scan)(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out_parameters);
+    bool (*scan)(const struct sim_model *model, const struct sim_coverage *coverage, size_t index,
+                 double *out_parameters);
     /// Whether a recording can show the effect with these parameters; if not, says why in one clause.
     bool (*testable)(const double *parameters, const struct sim_coverage *coverage, char *out_why, size_t size);
-    /// NULL, or whether part of the effect's usual range cannot show in a recording; if so, says which and why in one clause.
+    /// NULL, or whether part of the effect's usual range cannot show in a recording; if so, says which and why in one
+    /// clause.
     bool (*blind)(const struct sim_coverage *coverage, char *out_why, size_t size);
     /// The measurement that shows this effect apart from others: a clause after "measure".
     const char *measure;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /// The one model of a drive: both what stands in for hardware and what diagnosis corrects.
-/// Numbers are seen from the motor. On a linear axis (`linear`) the same fields hold the twins: kg for kgm2, N for Nm, m for
-/// rad. A model is plain data; files are read and written by lab/record/model_file.h.
+/// Numbers are seen from the motor. On a linear axis (`linear`) the same fields hold the twins: kg for kgm2, N for Nm,
+/// m for rad. A model is plain data; files are read and written by lab/record/model_file.h.
 #ifndef SERVOSCOPE_SIM_MODEL_H
 #define SERVOSCOPE_SIM_MODEL_H
 
@@ -23,11 +23,11 @@ struct sim_controller {
 };
 
 struct sim_sensors {
-    double counts_per_rev;           ///< encoder resolution (counts per rad times 2 pi; per m on a linear axis); 0: unquantised
-    double position_noise_rad;       ///< standard deviations, white
+    double counts_per_rev; ///< encoder resolution (counts per rad times 2 pi; per m on a linear axis); 0: unquantised
+    double position_noise_rad; ///< standard deviations, white
     double velocity_noise_rad_per_s;
     double torque_noise_Nm;
-    double velocity_filter_s;        ///< time constant of the speed signal's first-order filter, 0: none
+    double velocity_filter_s; ///< time constant of the speed signal's first-order filter, 0: none
 };
 
 struct sim_model {
@@ -43,13 +43,13 @@ struct sim_model {
     double dead_time_s;
     double pulley_radius_m;
     double sample_rate_hz;
-    double process_noise_Nm;         ///< white torque on the motor, standard deviation per sample
+    double process_noise_Nm; ///< white torque on the motor, standard deviation per sample
     bool has_end_stops;
     double end_stops_rad[2];
     uint64_t seed;
     struct sim_controller controller;
     struct sim_sensors sensors;
-    bool effect_on[sim_effects_max];                                      ///< indexed like sim_effects
+    bool effect_on[sim_effects_max]; ///< indexed like sim_effects
     double effect_parameters[sim_effects_max][sim_effect_parameters_max];
 };
 

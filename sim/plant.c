@@ -49,8 +49,8 @@ static double lagged(struct sim_actuator *self, const struct sim_model *model, d
 
 double sim_actuator_substep(struct sim_actuator *self, const struct sim_model *model, size_t index)
 {
-    // Samples from the start of the current one, seen through the dead time. A held value begins at every whole number, so
-    // a substep meets at most one change, and both parts of it are exact.
+    // Samples from the start of the current one, seen through the dead time. A held value begins at every whole number,
+    // so a substep meets at most one change, and both parts of it are exact.
     double delay = model->dead_time_s * model->sample_rate_hz;
     double from = (double)index / sim_substeps - delay, to = (double)(index + 1) / sim_substeps - delay;
     double change = ceil(from);
@@ -102,7 +102,8 @@ static void field_opposing(const struct field *self, const struct sim_motion *mo
     }
 }
 
-void sim_plant_opposing(const struct sim_model *model, const struct sim_motion *motion, struct sim_opposing *out_opposing)
+void sim_plant_opposing(const struct sim_model *model, const struct sim_motion *motion,
+                        struct sim_opposing *out_opposing)
 {
     struct field field;
     field_init(&field, model, 0.0);
@@ -122,8 +123,8 @@ static double belt_torque(const struct sim_plant *p, const struct sim_model *mod
 /// Torque left for acceleration and dry friction at the present state, and that friction for motion in `direction`.
 static double driving_torque(const struct sim_plant *p, const struct field *field, int direction, double *out_dry)
 {
-    struct sim_motion motion = {.position = p->position, .velocity = p->velocity, .time_s = p->time_s,
-                                .linear = field->model->linear};
+    struct sim_motion motion = {
+        .position = p->position, .velocity = p->velocity, .time_s = p->time_s, .linear = field->model->linear};
     struct sim_opposing o;
     field_opposing(field, &motion, &o);
     double factor = direction >= 0 ? o.positive_factor : o.negative_factor;
@@ -175,7 +176,8 @@ static struct sim_plant runge_kutta(const struct sim_plant *p, const struct fiel
         .velocity = (a.velocity + 2 * b.velocity + 2 * c.velocity + d.velocity) / 6,
         .acceleration = (a.acceleration + 2 * b.acceleration + 2 * c.acceleration + d.acceleration) / 6,
         .load_velocity = (a.load_velocity + 2 * b.load_velocity + 2 * c.load_velocity + d.load_velocity) / 6,
-        .load_acceleration = (a.load_acceleration + 2 * b.load_acceleration + 2 * c.load_acceleration + d.load_acceleration) / 6,
+        .load_acceleration =
+            (a.load_acceleration + 2 * b.load_acceleration + 2 * c.load_acceleration + d.load_acceleration) / 6,
     };
     return advanced(p, &mean, dt_s);
 }
@@ -192,9 +194,10 @@ static int breakaway(const struct sim_plant *p, const struct field *field)
     return 0;
 }
 
-/// Time after which the motor comes to rest in a step that ends with it running backward at end_speed. False position: the
-/// straight line alone would drop a speed of the second order of the step, which a belt's changing pull makes felt.
-static double time_to_rest(const struct sim_plant *p, const struct field *field, int direction, double dt_s, double end_speed)
+/// Time after which the motor comes to rest in a step that ends with it running backward at end_speed. False position:
+/// the straight line alone would drop a speed of the second order of the step, which a belt's changing pull makes felt.
+static double time_to_rest(const struct sim_plant *p, const struct field *field, int direction, double dt_s,
+                           double end_speed)
 {
     enum { refinements = 2 };
     double low_s = 0.0, low = fabs(p->velocity), high_s = dt_s, high = end_speed, at_s = 0.0;

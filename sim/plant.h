@@ -18,9 +18,9 @@ struct sim_plant {
 
 /// Torque command to torque: dead time (fractions of a sample too), then first-order lag.
 struct sim_actuator {
-    double held[sim_actuator_history];   ///< the last references, newest at `newest`
+    double held[sim_actuator_history]; ///< the last references, newest at `newest`
     size_t newest;
-    double torque;                       ///< state of the lag, Nm
+    double torque; ///< state of the lag, Nm
 };
 
 void sim_plant_init(struct sim_plant *self, double position);
@@ -36,10 +36,12 @@ void sim_actuator_hold(struct sim_actuator *self, double torque_ref);
 /// The motor torque at the sampling instant just begun (after sim_actuator_hold).
 double sim_actuator_now(const struct sim_actuator *self, const struct sim_model *model);
 
-/// Mean motor torque over substep `index` (0 .. sim_substeps-1) of the current sample; moves the lag's state to its end.
+/// Mean motor torque over substep `index` (0 .. sim_substeps-1) of the current sample; moves the lag's state to its
+/// end.
 double sim_actuator_substep(struct sim_actuator *self, const struct sim_model *model, size_t index);
 
 /// What the motor has to overcome at an instant, summed over the model and its effects.
-void sim_plant_opposing(const struct sim_model *model, const struct sim_motion *motion, struct sim_opposing *out_opposing);
+void sim_plant_opposing(const struct sim_model *model, const struct sim_motion *motion,
+                        struct sim_opposing *out_opposing);
 
 #endif

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// Random numbers of the simulation: xoshiro256** (Blackman, Vigna 2018), seeded through splitmix64; same seed, same numbers.
+/// Random numbers of the simulation: xoshiro256** (Blackman, Vigna 2018), seeded through splitmix64; same seed, same
+/// numbers.
 #ifndef SERVOSCOPE_SIM_RANDOM_H
 #define SERVOSCOPE_SIM_RANDOM_H
 

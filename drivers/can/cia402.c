@@ -13,13 +13,19 @@ enum {
     FA = cia402_fault,
 };
 
+// clang-format off
 static const uint8_t transitions[cia402_state_count][cia402_event_count] = {
-    /*        init shut s-on enab d-v  quick reset fault f-done q-done */
-    [NR] = {SD, NR, NR, NR, NR, NR, NR, FR, NR, NR}, [SD] = {SD, RD, SD, SD, SD, SD, SD, FR, SD, SD},
-    [RD] = {RD, RD, SO, SO, SD, SD, RD, FR, RD, RD}, [SO] = {SO, RD, SO, OE, SD, SD, SO, FR, SO, SO},
-    [OE] = {OE, RD, SO, OE, SD, QS, OE, FR, OE, OE}, [QS] = {QS, QS, QS, OE, SD, QS, QS, FR, QS, SD},
-    [FR] = {FR, FR, FR, FR, FR, FR, FR, FR, FA, FR}, [FA] = {FA, FA, FA, FA, FA, FA, SD, FA, FA, FA},
+    /*      init shut s-on enab d-v quick reset fault f-done q-done */
+    [NR] = {SD, NR, NR, NR, NR, NR, NR, FR, NR, NR},
+    [SD] = {SD, RD, SD, SD, SD, SD, SD, FR, SD, SD},
+    [RD] = {RD, RD, SO, SO, SD, SD, RD, FR, RD, RD},
+    [SO] = {SO, RD, SO, OE, SD, SD, SO, FR, SO, SO},
+    [OE] = {OE, RD, SO, OE, SD, QS, OE, FR, OE, OE},
+    [QS] = {QS, QS, QS, OE, SD, QS, QS, FR, QS, SD},
+    [FR] = {FR, FR, FR, FR, FR, FR, FR, FR, FA, FR},
+    [FA] = {FA, FA, FA, FA, FA, FA, SD, FA, FA, FA},
 };
+// clang-format on
 
 enum cia402_state cia402_state_after(enum cia402_state state, enum cia402_event event)
 {

@@ -25,8 +25,8 @@ static void make_rows(const struct design_request *request, const struct design_
     const struct design_peaks *at = &result->peak;
     const struct design_peaks *between = &result->peak_continuous;
     rows[row_torque] = (struct row){
-        linear ? "force" : "torque", linear ? "N" : "Nm",      result->torque_Nm,
-        limits->torque_Nm,           at->torque_Nm,            between->torque_Nm,
+        linear ? "force" : "torque", linear ? "N" : "Nm", result->torque_Nm,
+        limits->torque_Nm,           at->torque_Nm,       between->torque_Nm,
     };
     rows[row_velocity] = (struct row){
         "velocity",
@@ -37,8 +37,8 @@ static void make_rows(const struct design_request *request, const struct design_
         between->velocity_rad_per_s,
     };
     rows[row_position] = (struct row){
-        "position", linear ? "m" : "rad", result->position_rad, limits->position_rad, at->position_rad,
-        between->position_rad,
+        "position",           linear ? "m" : "rad", result->position_rad,
+        limits->position_rad, at->position_rad,     between->position_rad,
     };
     rows[row_acceleration] = (struct row){
         "acceleration",
@@ -86,11 +86,11 @@ static void add_period(struct page *page, const struct design_request *request, 
             add_panel(&figure, &rows[i], points, values, values + (i + 1) * points);
         }
     }
-    page_add_figure(page, &figure,
-                    "One period as it is played, from sample %zu of the table on%s.", result->start_index,
-                    request->start == design_start_paper
-                        ? ": the zero crossing of the velocity with the least acceleration, because the axis begins at rest"
-                        : "");
+    page_add_figure(
+        page, &figure, "One period as it is played, from sample %zu of the table on%s.", result->start_index,
+        request->start == design_start_paper
+            ? ": the zero crossing of the velocity with the least acceleration, because the axis begins at rest"
+            : "");
 }
 
 static void add_spectrum(struct page *page, const struct design_request *request, const struct design_result *result,

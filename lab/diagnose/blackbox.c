@@ -14,12 +14,14 @@ enum {
     filter_taps = 6,
 };
 
-static const size_t group_sizes[blackbox_groups] = {2 * speed_knots + 2, position_knots, direction_knots, 2 * filter_taps + 3};
+static const size_t group_sizes[blackbox_groups] = {2 * speed_knots + 2, position_knots, direction_knots,
+                                                    2 * filter_taps + 3};
 
 const char *blackbox_group_name(enum blackbox_group group)
 {
     static const char *const names[blackbox_groups] = {"a function of speed", "a function of position",
-                                                       "friction that changes with position", "a linear filter or a gain"};
+                                                       "friction that changes with position",
+                                                       "a linear filter or a gain"};
     return names[group];
 }
 
@@ -65,7 +67,8 @@ static size_t back(const struct recording *r, size_t n, size_t steps)
 }
 
 /// Filter regressor number `index` at sample n: taps of the torque, taps of the change of speed, on either channel.
-static void filter_function(const struct recording *r, size_t n, size_t index, double *out_mechanics, double *out_actuator)
+static void filter_function(const struct recording *r, size_t n, size_t index, double *out_mechanics,
+                            double *out_actuator)
 {
     const double *u = driving_signal(r);
     double torque = u[n], scale = 1.0 / r->coverage.torque_rms;
@@ -126,7 +129,8 @@ static bool build_run(const struct blackbox *self, const struct evidence *eviden
         for (size_t i = 0; i < group_sizes[group]; i++) {
             for (size_t n = 0; n < samples; n++)
                 regressor(&b, (enum blackbox_group)group, i, n, &signal[n], &signal[samples + n]);
-            evidence_whiten(evidence, signal, signal + samples, self->matrix + (self->group_begin[group] + i) * values + offset);
+            evidence_whiten(evidence, signal, signal + samples,
+                            self->matrix + (self->group_begin[group] + i) * values + offset);
         }
     free(signal);
     return true;
@@ -156,46 +160,62 @@ void blackbox_free(struct blackbox *self)
     memset(self, 0, sizeof *self);
 }
 
+/// Copies one group's columns to A from column m on, with their weights; returns the new number of columns.
+static size_t take_group(const struct blackbox *self, size_t rows, int group, size_t m, double *A, double *weight)
+{
+    for (size_t i = self->group_begin[group]; i < self->group_begin[group + 1]; i++, m++) {
+        double norm = 0.0;
+        memcpy(A + rows * m, self->matrix + rows * i, rows * sizeof *A);
+        for (size_t j = 0; j < rows; j++)
+            norm += A[rows * m + j] * A[rows * m + j];
+        // Groups overlap (constants, slopes), hence a ridge. Taps of the torque get a real prior: torque and motion
+        // together could otherwise rebuild the residual itself, noise and all, as minus one times the model.
+        weight[m] = fmax(1e-4 * sqrt(norm), group == blackbox_filter ? 1.0 / tap_deviation : 0.0);
+    }
+    return m;
+}
+
+/// Solves for the columns and leaves b - A x in b; returns its square and the priors'. Infinite if it cannot be solved.
+static double solve_rest(size_t rows, size_t m, const double *A, const double *weight, const double *centre, double *x,
+                         double *io_b)
+{
+    if (!least_squares_solve(rows, m, A, io_b, weight, centre, x, NULL))
+        return INFINITY;
+    double cost = 0.0;
+    for (size_t i = 0; i < m; i++) {
+        cost += weight[i] * weight[i] * (x[i] - centre[i]) * (x[i] - centre[i]);
+        for (size_t j = 0; j < rows; j++)
+            io_b[j] -= A[rows * i + j] * x[i];
+    }
+    for (size_t j = 0; j < rows; j++)
+        cost += io_b[j] * io_b[j];
+    return cost;
+}
+
 double blackbox_gain(const struct blackbox *self, const struct fit_data *data, const struct hypothesis *hypothesis,
                      const struct fit *fit, unsigned mask, double *out_cost, double *out_left)
 {
     size_t rows = data->values, most = self->columns + hypothesis->count, m = hypothesis->count;
-    double *A = malloc((rows * most + rows + 3 * most) * sizeof *A);
-    if (out_cost)
-        *out_cost = fit->cost;
-    if (!A)
-        return 0.0;
-    double *b = A + rows * most, *weight = b + rows, *centre = weight + most, *x = centre + most;
-    memcpy(A, fit->jacobian, rows * m * sizeof *A);
-    for (size_t i = 0; i < m; i++) {
-        weight[i] = hypothesis->coordinates[i].weight;
-        centre[i] = hypothesis->coordinates[i].centre - hypothesis->x[i];
-    }
-    for (int group = 0; group < blackbox_groups; group++)
-        for (size_t i = self->group_begin[group]; (mask >> group & 1) && i < self->group_begin[group + 1]; i++, m++) {
-            double norm = 0.0;
-            memcpy(A + rows * m, self->matrix + rows * i, rows * sizeof *A);
-            for (size_t j = 0; j < rows; j++)
-                norm += A[rows * m + j] * A[rows * m + j];
-            // Groups overlap (constants, slopes), hence a ridge. Taps of the torque get a real prior: torque and motion
-            // together could otherwise rebuild the residual itself, noise and all, as minus one times the model.
-            weight[m] = fmax(1e-4 * sqrt(norm), group == blackbox_filter ? 1.0 / tap_deviation : 0.0);
-            centre[m] = 0.0;
-        }
-    for (size_t j = 0; j < rows; j++)
-        b[j] = -fit->residual[j];
+    double *A = calloc(rows * most + rows + 3 * most, sizeof *A);
     double cost = fit->cost;
-    if (least_squares_solve(rows, m, A, b, weight, centre, x, NULL)) {
-        cost = 0.0;
+    if (A) {
+        double *b = A + rows * most, *weight = b + rows, *centre = weight + most, *x = centre + most;
+        memcpy(A, fit->jacobian, rows * m * sizeof *A);
         for (size_t i = 0; i < m; i++) {
-            cost += weight[i] * weight[i] * (x[i] - centre[i]) * (x[i] - centre[i]);
-            for (size_t j = 0; j < rows; j++)
-                b[j] -= A[rows * i + j] * x[i];
+            weight[i] = hypothesis->coordinates[i].weight;
+            centre[i] = hypothesis->coordinates[i].centre - hypothesis->x[i];
         }
+        for (int group = 0; group < blackbox_groups; group++)
+            if (mask >> group & 1)
+                m = take_group(self, rows, group, m, A, weight);
         for (size_t j = 0; j < rows; j++)
-            cost += b[j] * b[j];
-        for (size_t j = 0; out_left && j < rows; j++)
-            out_left[j] = -b[j];
+            b[j] = -fit->residual[j];
+        double left = solve_rest(rows, m, A, weight, centre, x, b);
+        if (left < cost) {
+            cost = left;
+            for (size_t j = 0; out_left && j < rows; j++)
+                out_left[j] = -b[j];
+        }
     }
     free(A);
     if (out_cost)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// A black box beside the model: any smooth function of speed, of position, of position for each direction, and any short
-/// linear filter. It names nothing; what it still finds in the residual is what the named causes do not explain.
+/// A black box beside the model: any smooth function of speed, of position, of position for each direction, and any
+/// short linear filter. It names nothing; what it still finds in the residual is what the named causes do not explain.
 #ifndef SERVOSCOPE_DIAGNOSE_BLACKBOX_H
 #define SERVOSCOPE_DIAGNOSE_BLACKBOX_H
 
@@ -27,8 +27,9 @@ struct blackbox {
 bool blackbox_init(struct blackbox *self, const struct fit_data *data);
 void blackbox_free(struct blackbox *self);
 
-/// Gain in nats of letting the groups in `mask` (bit per group) and the hypothesis' own parameters move, over the fit as it is.
-/// out_cost: the cost that is left; out_left: the whitened residual that is left, data->values; NULL: not wanted.
+/// Gain in nats of letting the groups in `mask` (bit per group) and the hypothesis' own parameters move, over the fit
+/// as it is. out_cost: the cost that is left; out_left: the whitened residual that is left, data->values; NULL: not
+/// wanted.
 /// Errors: 0 and the old cost if memory is short.
 double blackbox_gain(const struct blackbox *self, const struct fit_data *data, const struct hypothesis *hypothesis,
                      const struct fit *fit, unsigned mask, double *out_cost, double *out_left);

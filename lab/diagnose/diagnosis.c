@@ -20,7 +20,7 @@ struct work {
     struct recording *recordings; ///< fit runs, then validation runs
     struct evidence *evidence;    ///< likewise
     struct fit_data fit_data, validate_data;
-    struct run parts[2];          ///< of a run of which a part is held back; columns borrow the run's values
+    struct run parts[2]; ///< of a run of which a part is held back; columns borrow the run's values
     struct fit fit;
 };
 
@@ -70,6 +70,18 @@ static bool hold_back(const struct run *run, struct work *w)
     return run_part(run, 0, rows, 0, &w->parts[0]) && run_part(run, rows, run->rows - rows, 0, &w->parts[1]);
 }
 
+static int check_alike(const struct run *run, const struct recording *r, const struct run *first_run,
+                       const struct recording *first, struct error *out_error)
+{
+    bool reference = r->block.torque_ref != NULL, first_reference = first->block.torque_ref != NULL;
+    if (r->rate_hz == first->rate_hz && r->linear == first->linear && reference == first_reference)
+        return 0;
+    return error_set(out_error, error_refused,
+                     "%s: %g Hz, %s, %s torque reference; %s: %g Hz, %s, %s: all runs have to be alike", run->path,
+                     r->rate_hz, r->linear ? "linear" : "rotary", reference ? "with" : "without", first_run->path,
+                     first->rate_hz, first->linear ? "linear" : "rotary", first_reference ? "with" : "without");
+}
+
 static int prepare_recordings(const struct diagnosis_request *request, struct work *w, struct diagnosis *d,
                               struct error *out_error)
 {
@@ -86,16 +98,10 @@ static int prepare_recordings(const struct diagnosis_request *request, struct wo
         if (d->held_back && (i == 0 || i == w->fit_count))
             run = &w->parts[i == 0 ? 0 : 1];
         int status = recording_prepare(run, &w->recordings[i], out_error);
+        if (status == 0)
+            status = check_alike(run, &w->recordings[i], &request->fit[0], &w->recordings[0], out_error);
         if (status != 0)
             return status;
-        const struct recording *first = &w->recordings[0], *r = &w->recordings[i];
-        if (r->rate_hz != first->rate_hz || r->linear != first->linear ||
-            !r->block.torque_ref != !first->block.torque_ref)
-            return error_set(out_error, error_refused,
-                             "%s: %g Hz, %s, %s torque reference; %s: %g Hz, %s, %s: all runs have to be alike", run->path,
-                             r->rate_hz, r->linear ? "linear" : "rotary", r->block.torque_ref ? "with" : "without",
-                             request->fit[0].path, first->rate_hz, first->linear ? "linear" : "rotary",
-                             first->block.torque_ref ? "with" : "without");
     }
     return 0;
 }
@@ -121,7 +127,8 @@ static int choose_model(const struct diagnosis_request *request, const struct re
     if (request->model) {
         d->given = *request->model;
         if (d->given.linear != first->linear)
-            return error_set(out_error, error_refused, "the model is %s and %s is %s: use a model in the units of the runs",
+            return error_set(out_error, error_refused,
+                             "the model is %s and %s is %s: use a model in the units of the runs",
                              d->given.linear ? "linear (kg, N)" : "rotary (kgm2, Nm)", request->fit[0].path,
                              first->linear ? "linear (m, N)" : "rotary (rad, Nm)");
     } else {
@@ -164,8 +171,8 @@ static bool tell(const struct diagnosis_request *request, const char *what)
     return !request->progress || request->progress(request->user, what);
 }
 
-/// Without periods the residual itself is all there is to take the noise from. What a black box can explain of it is taken out
-/// first, or friction that the model lacks would pass for noise and never be worth a name.
+/// Without periods the residual itself is all there is to take the noise from. What a black box can explain of it is
+/// taken out first, or friction that the model lacks would pass for noise and never be worth a name.
 static bool sharpen_noise(struct evidence *evidence, const struct fit_data *data, struct fit *fit, struct hypothesis *h,
                           size_t iterations)
 {
@@ -207,14 +214,16 @@ static bool same_names(const struct hypothesis *a, const struct hypothesis *b)
     return memcmp(a->named, b->named, sizeof a->named) == 0;
 }
 
-/// Refits the given structure, then searches; the noise is estimated anew under every better model, because a wrong model's
-/// errors scatter with the motion and would pass for noise.
-static bool find_causes(const struct diagnosis_request *request, struct work *w, struct diagnosis *d, struct hypothesis *h)
+/// Refits the given structure, then searches; the noise is estimated anew under every better model, because a wrong
+/// model's errors scatter with the motion and would pass for noise.
+static bool find_causes(const struct diagnosis_request *request, struct work *w, struct diagnosis *d,
+                        struct hypothesis *h)
 {
     struct sim_model model = d->given;
     hypothesis_init(h, &d->given, !d->model_given, w->recordings[0].block.torque_ref != NULL);
     for (int pass = 0; pass < 2; pass++) {
-        if (!estimate_noise(w->evidence, w->fit_count, &model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
+        if (!estimate_noise(w->evidence, w->fit_count, &model) ||
+            !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
             !fit_run(&w->fit, &w->fit_data, h, refit_iterations))
             return false;
         hypothesis_model(h, NULL, &model);
@@ -223,7 +232,8 @@ static bool find_causes(const struct diagnosis_request *request, struct work *w,
     struct search_options options = {.causes_max = 6, .progress = request->progress, .user = request->user};
     for (int pass = 0; pass < 4; pass++) {
         struct hypothesis before = *h;
-        if (!estimate_noise(w->evidence, w->fit_count, &model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
+        if (!estimate_noise(w->evidence, w->fit_count, &model) ||
+            !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
             !search_run(&w->fit_data, &w->recordings[0].coverage, &options, h, &w->fit))
             return false;
         hypothesis_model(h, NULL, &model);
@@ -260,7 +270,8 @@ static int stronger(const void *a, const void *b)
     return (x < y) - (x > y);
 }
 
-static void list_causes(const struct work *w, struct diagnosis *d, const struct hypothesis *h, const struct judgement *judgement)
+static void list_causes(const struct work *w, struct diagnosis *d, const struct hypothesis *h,
+                        const struct judgement *judgement)
 {
     for (int e = 0; sim_effects[e]; e++) {
         if (!h->named[e])
@@ -335,8 +346,10 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     list_deviations(w, d, h);
     if (judgement.unexplained) {
         snprintf(d->where, sizeof d->where, "%s", judgement.where);
-        d->unexplained_share = fmin(fmax((pow(d->extended.whitened_rms, 2.0) - 1.0) /
-                                             fmax(pow(d->nominal.whitened_rms, 2.0) - 1.0, 1e-12), 0.0), 1.0);
+        d->unexplained_share =
+            fmin(fmax((pow(d->extended.whitened_rms, 2.0) - 1.0) / fmax(pow(d->nominal.whitened_rms, 2.0) - 1.0, 1e-12),
+                      0.0),
+                 1.0);
     }
     if (h->inertia_free || !judgement.unexplained) {
         d->tie_count = judge_ties(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, d->ties, diagnosis_ties_max);
@@ -360,9 +373,12 @@ int diagnosis_run(const struct diagnosis_request *request, struct diagnosis *out
         name_runs(request, d);
         snprintf(d->motion_from, sizeof d->motion_from, "%s", w.recordings[0].motion_from);
         tell(request, "refitting the given model");
-        if (!find_causes(request, &w, d, &h) || !(tell(request, "judging on data the fit has not seen"), conclude(&w, d, &h)))
-            status = error_set(out_error, error_refused, "%s: the fit failed: not enough memory, or a model that the data cannot "
-                                                         "determine", request->fit[0].path);
+        if (!find_causes(request, &w, d, &h) ||
+            !(tell(request, "judging on data the fit has not seen"), conclude(&w, d, &h)))
+            status = error_set(out_error, error_refused,
+                               "%s: the fit failed: not enough memory, or a model that the data cannot "
+                               "determine",
+                               request->fit[0].path);
     }
     work_free(&w);
     if (status != 0)
@@ -373,9 +389,10 @@ int diagnosis_run(const struct diagnosis_request *request, struct diagnosis *out
 void diagnosis_free(struct diagnosis *self)
 {
     struct diagnosis_curves *c = &self->curves;
-    double *all[] = {c->frequency_hz, c->torque_Nm, c->nominal_Nm, c->refitted_Nm, c->extended_Nm, c->two_sigma_Nm, c->time_s,
-                     c->position, c->velocity, c->friction_measured, c->residual_nominal, c->residual_extended,
-                     c->curve_velocity, c->curve_nominal, c->curve_extended};
+    double *all[] = {c->frequency_hz,   c->torque_Nm,         c->nominal_Nm,       c->refitted_Nm,
+                     c->extended_Nm,    c->two_sigma_Nm,      c->time_s,           c->position,
+                     c->velocity,       c->friction_measured, c->residual_nominal, c->residual_extended,
+                     c->curve_velocity, c->curve_nominal,     c->curve_extended};
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
         free(all[i]);
     memset(self, 0, sizeof *self);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /// Names what a simulation gets wrong about recordings, or says that it cannot.
-/// Order of work: the given model; its own numbers refitted within a few percent; causes by forward selection on the fit runs;
-/// what is left held against a black box; everything judged on data the fit has not seen. docs/theory.md, "Diagnosis".
+/// Order of work: the given model; its own numbers refitted within a few percent; causes by forward selection on the
+/// fit runs; what is left held against a black box; everything judged on data the fit has not seen. docs/theory.md,
+/// "Diagnosis".
 #ifndef SERVOSCOPE_DIAGNOSE_DIAGNOSIS_H
 #define SERVOSCOPE_DIAGNOSE_DIAGNOSIS_H
 
@@ -19,11 +20,11 @@ enum { diagnosis_causes_max = 8, diagnosis_ties_max = 8 };
 
 /// An effect found, with estimates.
 struct diagnosis_cause {
-    int effect;                                     ///< index in sim_effects
-    double evidence;                                ///< nats: what the fit loses without it
+    int effect;      ///< index in sim_effects
+    double evidence; ///< nats: what the fit loses without it
     double values[sim_effect_parameters_max];
     double deviations[sim_effect_parameters_max];
-    double nominal[sim_effect_parameters_max];      ///< of the given model, 0 where it has none
+    double nominal[sim_effect_parameters_max]; ///< of the given model, 0 where it has none
     char says[400];
 };
 
@@ -39,21 +40,22 @@ struct diagnosis_untestable {
 
 /// How well one model does on the validation data.
 struct diagnosis_figures {
-    double validation_nrmse; ///< see DESIGN: torque the model lacks or misplaces, excited band, over the measured torque's RMS
-    double whitened_rms;     ///< one-step prediction errors over their expected standard deviation
+    double
+        validation_nrmse; ///< see DESIGN: torque the model lacks or misplaces, excited band, over the measured torque's RMS
+    double whitened_rms; ///< one-step prediction errors over their expected standard deviation
 };
 
 /// Curves for the report, from the validation data. All arrays are owned and have the stated number of values.
 struct diagnosis_curves {
-    size_t bins;             ///< looked at, from the first above zero
+    size_t bins; ///< looked at, from the first above zero
     double *frequency_hz;
-    double *torque_Nm;       ///< magnitude of the measured torque per bin
+    double *torque_Nm;                              ///< magnitude of the measured torque per bin
     double *nominal_Nm, *refitted_Nm, *extended_Nm; ///< magnitude of what each model is off by
-    double *two_sigma_Nm;    ///< expected of a perfect model, from the noise
-    size_t samples;          ///< of one block
+    double *two_sigma_Nm;                           ///< expected of a perfect model, from the noise
+    size_t samples;                                 ///< of one block
     double rate_hz;
     double *time_s, *position, *velocity;
-    double *friction_measured; ///< torque left after inertia, belt and what depends on position, in the extended model
+    double *friction_measured; ///< torque left after inertia, belt and what depends on position
     double *residual_nominal, *residual_extended; ///< Nm, excited band
     size_t curve_points;
     double *curve_velocity, *curve_nominal, *curve_extended; ///< friction against speed as the models have it
@@ -64,7 +66,7 @@ struct diagnosis {
     bool linear, model_given, held_back; ///< held_back: validated on the last part of the only run
     char runs[512], motion_from[200];    ///< what was fitted; one sentence on the filtering
     struct sim_model given, refitted_model, extended_model;
-    struct model_deviations deviations;  ///< of extended_model
+    struct model_deviations deviations; ///< of extended_model
     size_t cause_count, candidate_count, tie_count, untestable_count;
     struct diagnosis_cause causes[diagnosis_causes_max], candidates[diagnosis_causes_max];
     struct diagnosis_tie ties[diagnosis_ties_max];
@@ -78,11 +80,11 @@ struct diagnosis {
 };
 
 struct diagnosis_request {
-    const struct run *fit;  ///< fit_count runs of one drive, same rate
+    const struct run *fit; ///< fit_count runs of one drive, same rate
     size_t fit_count;
     const struct run *validate;
-    size_t validate_count;  ///< 0: the last third of the first run is held back
-    const struct sim_model *model; ///< NULL: a rigid body without friction, its inertia free
+    size_t validate_count;                          ///< 0: the last third of the first run is held back
+    const struct sim_model *model;                  ///< NULL: a rigid body without friction, its inertia free
     bool (*progress)(void *user, const char *what); ///< NULL: none; false stops with the best so far
     void *user;
 };

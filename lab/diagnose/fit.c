@@ -54,7 +54,8 @@ static double sum_of_squares(size_t n, const double *r)
     return sum;
 }
 
-static double residual_at(const struct fit_data *data, const struct hypothesis *h, const double *x, double *out_residual)
+static double residual_at(const struct fit_data *data, const struct hypothesis *h, const double *x,
+                          double *out_residual)
 {
     struct sim_model model;
     hypothesis_model(h, x, &model);
@@ -70,8 +71,8 @@ double fit_cost(struct fit *self, const struct fit_data *data, const struct hypo
     return self->cost;
 }
 
-/// One-sided differences, away from the nearer bound. The residual is nearly linear in most coordinates, so that a step large
-/// enough to average over the instants at which friction changes sign costs no accuracy.
+/// One-sided differences, away from the nearer bound. The residual is nearly linear in most coordinates, so that a step
+/// large enough to average over the instants at which friction changes sign costs no accuracy.
 static void differentiate_by(const struct fit_data *data, const struct hypothesis *h, size_t i, const double *residual,
                              double *out_column)
 {
@@ -87,7 +88,8 @@ static void differentiate_by(const struct fit_data *data, const struct hypothesi
         out_column[j] = (out_column[j] - residual[j]) / step;
 }
 
-static void differentiate(struct fit *self, const struct fit_data *data, const struct hypothesis *h, const double *residual)
+static void differentiate(struct fit *self, const struct fit_data *data, const struct hypothesis *h,
+                          const double *residual)
 {
     for (size_t i = 0; i < h->count; i++)
         differentiate_by(data, h, i, residual, self->jacobian + i * data->values);
@@ -117,7 +119,8 @@ static bool solve_step(const struct fit *self, const struct fit_data *data, cons
             double prior = h->coordinates[i].weight;
             double marquardt = damping * sum_of_squares(rows, column);
             weight[m] = sqrt(prior * prior + marquardt);
-            centre[m] = weight[m] > 0.0 ? prior * prior * (h->coordinates[i].centre - h->x[i]) / (weight[m] * weight[m]) : 0.0;
+            centre[m] =
+                weight[m] > 0.0 ? prior * prior * (h->coordinates[i].centre - h->x[i]) / (weight[m] * weight[m]) : 0.0;
             map[m++] = i;
         }
         double covariance[hypothesis_coordinates_max * hypothesis_coordinates_max];
@@ -150,8 +153,8 @@ static bool moved(const struct hypothesis *h, const double *x)
 }
 
 /// Tries the step to x; takes it if it improves. Returns false when there is nothing more to be had.
-static bool take_step(struct fit *self, const struct fit_data *data, struct hypothesis *h, const double *x, double *trial,
-                      double *io_damping, bool *out_taken)
+static bool take_step(struct fit *self, const struct fit_data *data, struct hypothesis *h, const double *x,
+                      double *trial, double *io_damping, bool *out_taken)
 {
     const double settled = 1e-3; // of -2 log likelihood
     double cost = residual_at(data, h, x, trial), before = self->cost;
@@ -212,7 +215,8 @@ static size_t find_coordinate(const struct hypothesis *h, const struct coordinat
 {
     for (size_t i = 0; i < h->count; i++) {
         const struct coordinate *d = &h->coordinates[i];
-        if (d->effect == c->effect && d->parameter == c->parameter && d->model_offset == c->model_offset && d->unit == c->unit)
+        if (d->effect == c->effect && d->parameter == c->parameter && d->model_offset == c->model_offset &&
+            d->unit == c->unit)
             return i;
     }
     return h->count;

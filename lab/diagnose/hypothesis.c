@@ -67,31 +67,47 @@ static bool belongs_to_belt(size_t offset)
            offset == offsetof(struct sim_model, belt_damping_Nms_per_rad);
 }
 
+static bool belongs_to_inertia(size_t offset)
+{
+    return offset == offsetof(struct sim_model, motor_inertia_kgm2) ||
+           offset == offsetof(struct sim_model, load_inertia_kgm2);
+}
+
+/// Whether the present structure has the number at all, the recordings can show it, and nothing moves it yet.
+static bool may_be_off(const struct hypothesis *self, size_t offset)
+{
+    if (belongs_to_belt(offset) && self->engaged.structure != sim_structure_two_mass)
+        return false;
+    if (belongs_to_actuator(offset) && !self->actuator_seen)
+        return false;
+    return field(&self->engaged, offset) > 0.0 && find_offset(self, offset) == SIZE_MAX &&
+           self->count < hypothesis_coordinates_max;
+}
+
+static void set_box(struct coordinate *c, double lower, double upper, double weight)
+{
+    c->lower = lower;
+    c->upper = upper;
+    c->weight = weight;
+}
+
 /// The few percent by which a number of the given model may be off.
 static void add_nuisance(struct hypothesis *self, const struct tolerance *t)
 {
-    const struct sim_model *m = &self->engaged;
-    double value = field(m, t->offset);
-    if (!(value > 0.0) || (belongs_to_belt(t->offset) && m->structure != sim_structure_two_mass) ||
-        (belongs_to_actuator(t->offset) && !self->actuator_seen) || find_offset(self, t->offset) != SIZE_MAX ||
-        self->count == hypothesis_coordinates_max)
+    if (!may_be_off(self, t->offset))
         return;
-    bool inertia = t->offset == offsetof(struct sim_model, motor_inertia_kgm2) ||
-                   t->offset == offsetof(struct sim_model, load_inertia_kgm2);
-    bool split_unknown = inertia && m->structure != self->given->structure;
-    struct coordinate c = {.effect = -1, .model_offset = t->offset, .scale = coordinate_logarithmic, .unit = value};
-    c.weight = 1.0 / t->deviation;
-    c.lower = log1p(-fmin(t->box, 0.9));
-    c.upper = log1p(t->box);
+    struct coordinate c = {.effect = -1,
+                           .model_offset = t->offset,
+                           .scale = coordinate_logarithmic,
+                           .unit = field(&self->engaged, t->offset)};
+    bool inertia = belongs_to_inertia(t->offset);
+    set_box(&c, log1p(-fmin(t->box, 0.9)), log1p(t->box), 1.0 / t->deviation);
     if (inertia && self->inertia_free) {
-        c.weight = 0.0;
-        c.lower = -40.0;
-        c.upper = 40.0;
-    } else if (split_unknown) { // a rigid model shows the sum only: its split may be less exact, or not known at all
-        bool given = self->given->motor_inertia_kgm2 > 0.0 && self->given->load_inertia_kgm2 > 0.0;
-        c.weight = given ? 10.0 : 1.0;
-        c.lower = given ? -0.4 : -3.0;
-        c.upper = given ? 0.4 : 3.0;
+        set_box(&c, -40.0, 40.0, 0.0);
+    } else if (inertia && self->engaged.structure != self->given->structure) {
+        // A rigid model shows the sum only: its split may be less exact, or not known at all.
+        bool split = self->given->motor_inertia_kgm2 > 0.0 && self->given->load_inertia_kgm2 > 0.0;
+        set_box(&c, split ? -0.4 : -3.0, split ? 0.4 : 3.0, split ? 10.0 : 1.0);
     }
     add_coordinate(self, c, 0.0);
 }
@@ -120,7 +136,8 @@ bool hypothesis_may_name(const struct hypothesis *self, int effect)
         return false;
     if (e->place == sim_place_actuator && !self->actuator_seen)
         return false;
-    bool free_inertia = e->parameters[0].model_offset == offsetof(struct sim_model, load_inertia_kgm2) && self->inertia_free;
+    bool free_inertia =
+        e->parameters[0].model_offset == offsetof(struct sim_model, load_inertia_kgm2) && self->inertia_free;
     return !free_inertia && (!e->applies || e->applies(self->given));
 }
 
@@ -130,7 +147,8 @@ static void name_parameter(struct hypothesis *self, int effect, size_t i, const 
     bool linear = self->given->linear;
     double low = linear ? p->linear_minimum : p->minimum, high = linear ? p->linear_maximum : p->maximum;
     struct coordinate c = {.effect = effect, .parameter = i, .model_offset = p->model_offset, .unit = 1.0};
-    const double widest = 3.4; // thirtyfold either way of where the search starts: far enough, and the plant stays solvable
+    const double widest =
+        3.4; // thirtyfold either way of where the search starts: far enough, and the plant stays solvable
     double x = 1.0;
     switch (p->kind) {
     case sim_parameter_linear:

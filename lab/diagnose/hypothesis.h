@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /// A hypothesis about what a model gets wrong: which effects are named causes, and which numbers may move meanwhile.
 /// The given model's own numbers may always be off by a few percent: they move within a box around what was given, at a
-/// small cost. Naming an effect opens the box for its parameters, or switches it on. Nothing here knows an effect by name.
+/// small cost. Naming an effect opens the box for its parameters, or switches it on. Nothing here knows an effect by
+/// name.
 #ifndef SERVOSCOPE_DIAGNOSE_HYPOTHESIS_H
 #define SERVOSCOPE_DIAGNOSE_HYPOTHESIS_H
 
@@ -21,19 +22,19 @@ enum coordinate_scale {
 };
 
 struct coordinate {
-    int effect;              ///< index in sim_effects, -1: a nuisance of the given model
-    size_t parameter;        ///< of that effect
-    size_t model_offset;     ///< of the double in struct sim_model, SIZE_MAX: an effect's parameter
+    int effect;          ///< index in sim_effects, -1: a nuisance of the given model
+    size_t parameter;    ///< of that effect
+    size_t model_offset; ///< of the double in struct sim_model, SIZE_MAX: an effect's parameter
     enum coordinate_scale scale;
     double unit;
-    double lower, upper;     ///< bounds of x
-    double centre, weight;   ///< prior: weight (x - centre), weight 0: none
+    double lower, upper;   ///< bounds of x
+    double centre, weight; ///< prior: weight (x - centre), weight 0: none
 };
 
 struct hypothesis {
     const struct sim_model *given;
-    bool inertia_free;       ///< no model was given: the rigid body's inertia has no prior and no box
-    bool actuator_seen;      ///< the recordings have a torque reference: what lies between it and the torque can show
+    bool inertia_free;  ///< no model was given: the rigid body's inertia has no prior and no box
+    bool actuator_seen; ///< the recordings have a torque reference: what lies between it and the torque can show
     bool named[sim_effects_max];
     size_t count;
     struct coordinate coordinates[hypothesis_coordinates_max];

@@ -72,7 +72,8 @@ static void describe_rest(const struct blackbox *box, const struct fit_data *dat
     for (size_t b = 1; b < bands; b++)
         if (sums[b] > sums[worst])
             worst = b;
-    double width_hz = (double)(e->recording->band + 1) / bands * e->recording->rate_hz / (double)e->recording->block.samples;
+    double width_hz =
+        (double)(e->recording->band + 1) / bands * e->recording->rate_hz / (double)e->recording->block.samples;
     double gains[blackbox_groups];
     int best = 0;
     for (int g = 0; g < blackbox_groups; g++) {
@@ -80,8 +81,9 @@ static void describe_rest(const struct blackbox *box, const struct fit_data *dat
         if (gains[g] > gains[best])
             best = g;
     }
-    snprintf(out_text, size, "%.3g..%.3g Hz holds %.0f %% of it; %s would explain %.0f %% of it", (double)worst * width_hz,
-             (double)(worst + 1) * width_hz, 100.0 * fmin(fmax(sums[worst] / fmax(total, 1e-9), 0.0), 1.0),
+    snprintf(out_text, size, "%.3g..%.3g Hz holds %.0f %% of it; %s would explain %.0f %% of it",
+             (double)worst * width_hz, (double)(worst + 1) * width_hz,
+             100.0 * fmin(fmax(sums[worst] / fmax(total, 1e-9), 0.0), 1.0),
              blackbox_group_name((enum blackbox_group)best), 100.0 * fmin(2.0 * gains[best] / fmax(total, 1e-9), 1.0));
 }
 
@@ -89,8 +91,8 @@ static void judge_names(const struct blackbox *box, const struct fit_data *data,
                         const struct hypothesis *h, const struct fit *fit, struct judgement *j)
 {
     const double least_share = 0.004; // of the torque's RMS: less is not worth a name even if it is significant
-    // How far a cause has to outweigh what stays unexplained. Beside a given model a name says what changed, and a term of the
-    // wrong shape gains a hundred times what it leaves. Without a model it says what is there at all.
+    // How far a cause has to outweigh what stays unexplained. Beside a given model a name says what changed, and a term
+    // of the wrong shape gains a hundred times what it leaves. Without a model it says what is there at all.
     const double dominance = h->inertia_free ? 5.0 : 1000.0;
     for (int e = 0; sim_effects[e]; e++) {
         if (!h->named[e])
@@ -106,8 +108,8 @@ static void judge_names(const struct blackbox *box, const struct fit_data *data,
     }
 }
 
-/// Whether one group of the black box, beside the given model, does as well as three or more names together: one gap, then,
-/// which the catalogue pieces together. Returns the group, or blackbox_groups if there is none.
+/// Whether one group of the black box, beside the given model, does as well as three or more names together: one gap,
+/// then, which the catalogue pieces together. Returns the group, or blackbox_groups if there is none.
 static enum blackbox_group one_gap(const struct blackbox *box, const struct fit_data *data, const struct hypothesis *h,
                                    const struct fit *fit)
 {
@@ -146,8 +148,8 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
     double scale = fmax(left / (double)data->values, 1.0);
     double chance = 0.5 * (double)box.columns + 12.0 * sqrt(0.5 * (double)box.columns);
     const double half_again = 1.5, visible = 1.12; // a third of the noise, in amplitude
-    j->unexplained = (j->leftover / scale > chance && fit->cost > visible * left) || fit->cost / (double)data->values > half_again * half_again ||
-                     !(validation_rms < half_again);
+    j->unexplained = (j->leftover / scale > chance && fit->cost > visible * left) ||
+                     fit->cost / (double)data->values > half_again * half_again || !(validation_rms < half_again);
     enum blackbox_group gap = hypothesis->inertia_free ? blackbox_groups : one_gap(&box, data, hypothesis, fit);
     if (gap != blackbox_groups && !j->unexplained) {
         j->unexplained = true;

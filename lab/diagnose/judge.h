@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// Whether the named causes are the answer: what a black box still finds, which names survive it, which cannot be told apart.
+/// Whether the named causes are the answer: what a black box still finds, which names survive it, which cannot be told
+/// apart.
 #ifndef SERVOSCOPE_DIAGNOSE_JUDGE_H
 #define SERVOSCOPE_DIAGNOSE_JUDGE_H
 
@@ -8,16 +9,18 @@
 
 struct judgement {
     bool unexplained;
-    double leftover;               ///< nats that the black box still gains over the named causes
-    size_t count;                  ///< of named effects that stand
+    double leftover; ///< nats that the black box still gains over the named causes
+    size_t count;    ///< of named effects that stand
     bool stands[sim_effects_max];
-    char where[300];               ///< what is left, in words
+    char where[300]; ///< what is left, in words
 };
 
 /// Judges a finished search. `validation_rms` is the whitened RMS of the extended model on the validation data.
-/// Unexplained: the black box gains more than chance allows (its expected gain plus twelve standard deviations) and more than a
-/// third of the noise in amplitude, or one group of it does as well as three names, or the residual on fit or validation data is half again as large as the noise. A name stands if it explains a visible share of the
-/// torque and, where something stays unexplained, far more than what stays and more than the black box can do without it.
+/// Unexplained: the black box gains more than chance allows (its expected gain plus twelve standard deviations) and
+///              more than a
+/// third of the noise in amplitude, or one group of it does as well as three names, or the residual on fit or
+/// validation data is half again as large as the noise. A name stands if it explains a visible share of the torque and,
+/// where something stays unexplained, far more than what stays and more than the black box can do without it.
 /// Errors: false if memory is short.
 bool judge(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,
            const struct fit *fit, double validation_rms, struct judgement *out_judgement);

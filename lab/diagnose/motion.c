@@ -30,8 +30,8 @@ static void differentiate(size_t n, double rate_hz, const double *x, double *out
     }
 }
 
-/// Standard deviation of the white part of a signal, from third differences: motion is smooth from sample to sample, noise
-/// is not. In a periodic run the difference to the period before takes the motion out altogether.
+/// Standard deviation of the white part of a signal, from third differences: motion is smooth from sample to sample,
+/// noise is not. In a periodic run the difference to the period before takes the motion out altogether.
 static double white_noise(size_t n, const double *x, size_t period)
 {
     double sum = 0.0;
@@ -50,8 +50,8 @@ static double white_noise(size_t n, const double *x, size_t period)
 }
 
 struct agreement {
-    double gain;      ///< of the speed column over the derivative of the position
-    double delay;     ///< of the speed column, samples
+    double gain;  ///< of the speed column over the derivative of the position
+    double delay; ///< of the speed column, samples
 };
 
 /// Least squares of speed = gain * derivative - delay * d(derivative)/dn.
@@ -72,7 +72,7 @@ static struct agreement compare_speed(size_t n, const double *derivative, const 
 /// v + L (d - v) with the zero-phase first-order low-pass L, forward and backward.
 static void blend(size_t n, double omega, const double *derivative, const double *velocity, double *out)
 {
-    double keep = exp(-omega), state = derivative[0] - velocity[0];
+    double keep = exp(-omega), state = 0.0;
     for (size_t i = 0; i < n; i++) {
         state = keep * state + (1.0 - keep) * (derivative[i] - velocity[i]);
         out[i] = state;
@@ -91,17 +91,20 @@ static bool from_both(size_t n, double rate_hz, const double *velocity, size_t p
     struct agreement a = compare_speed(n, derivative, velocity);
     const double most_gain = 0.02, most_delay = 0.1;
     if (fabs(a.gain - 1.0) > most_gain || fabs(a.delay) > most_delay) {
-        snprintf(out_text, size, "The speed column is %.3g times the derivative of the position and %.2g samples late: left out.",
+        snprintf(out_text, size,
+                 "The speed column is %.3g times the derivative of the position and %.2g samples late: left out.",
                  a.gain, a.delay);
         return false;
     }
     double sigma_p = white_noise(n, out->position, period), sigma_v = white_noise(n, velocity, period);
     // Torque is held between samples, so speed has kinks, and position samples see their images as motion: an error of
-    // (f / f_s)^2 of the speed. Below a fiftieth of the sampling rate that is under a part in two thousand, and fades fast.
+    // (f / f_s)^2 of the speed. Below a fiftieth of the sampling rate that is under a part in two thousand, and fades
+    // fast.
     const double most = turn * 0.02;
     double omega = sigma_p > 0.0 ? fmin(sigma_v / (sigma_p * rate_hz), most) : most;
     blend(n, fmax(omega, 1e-6), derivative, velocity, out->velocity);
-    snprintf(out_text, size, "Speed: from the position below %.3g Hz, from the speed column above, where each is less noisy.",
+    snprintf(out_text, size,
+             "Speed: from the position below %.3g Hz, from the speed column above, where each is less noisy.",
              omega * rate_hz / turn);
     return true;
 }
@@ -134,11 +137,13 @@ bool motion_estimate(size_t rows, double rate_hz, const double *position, const 
     if (period == 0)
         return motion_of_rows(rows, rate_hz, position, velocity, 0, out, out_text, size);
     size_t more = period < 256 ? period : 256;
-    double *longer_position = extended(rows, position, period, more), *longer_velocity = extended(rows, velocity, period, more);
+    double *longer_position = extended(rows, position, period, more),
+           *longer_velocity = extended(rows, velocity, period, more);
     struct stretch longer = {.samples = rows + more,
                              .position = malloc((rows + more) * sizeof(double)),
                              .velocity = malloc((rows + more) * sizeof(double))};
-    bool good = (!position || longer_position) && (!velocity || longer_velocity) && longer.position && longer.velocity &&
+    bool good = (!position || longer_position) && (!velocity || longer_velocity) && longer.position &&
+                longer.velocity &&
                 motion_of_rows(rows + more, rate_hz, longer_position, longer_velocity, period, &longer, out_text, size);
     if (good) {
         memcpy(out->position, longer.position, rows * sizeof(double));

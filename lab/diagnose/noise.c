@@ -78,7 +78,9 @@ static void smooth(const struct evidence *self, const double *raw)
 {
     size_t band = self->recording->band;
     for (size_t k = 0; k <= band; k++) {
-        size_t reach = self->recording->periodic ? 10 : 15 + k / 5;
+        // The noise of a measured speed grows with the square of frequency here: few neighbours at the low end.
+        size_t near = k / 2 > 2 ? k / 2 : 2;
+        size_t reach = !self->recording->periodic ? 15 + k / 5 : near < 10 ? near : 10;
         // Bin 0 is real: its variance is that of a complex neighbour, so it is left out of the others' means.
         size_t from = k > reach ? k - reach : 1, to = k + reach < band ? k + reach : band;
         for (size_t j = 0; j < 4; j++) {
@@ -90,7 +92,8 @@ static void smooth(const struct evidence *self, const double *raw)
     }
 }
 
-/// Inverse Cholesky factor per bin, for real and imaginary parts of unit variance (hence half the complex variance each).
+/// Inverse Cholesky factor per bin, for real and imaginary parts of unit variance (hence half the complex variance
+/// each).
 static void factorise(const struct evidence *self)
 {
     for (size_t k = 0; k <= self->recording->band; k++) {

@@ -11,12 +11,12 @@ struct fft_plan;
 /// A recording with its noise: what a likelihood needs. Channels: mechanics, and actuator if there is a reference.
 struct evidence {
     const struct recording *recording;
-    double scale_inertia;   ///< of predict(); the same for every model that is compared
-    size_t channels;        ///< 1 or 2
-    size_t values;          ///< length of a whitened residual
+    double scale_inertia; ///< of predict(); the same for every model that is compared
+    size_t channels;      ///< 1 or 2
+    size_t values;        ///< length of a whitened residual
     struct fft_plan *plan;
-    double *covariance;     ///< per bin 0..band: S_mm, S_aa, Re S_am, Im S_am of the block's DFT divided by its length
-    double *factor;         ///< per bin: inverse Cholesky factor, l_mm, l_aa, Re l_am, Im l_am
+    double *covariance; ///< per bin 0..band: S_mm, S_aa, Re S_am, Im S_am of the block's DFT divided by its length
+    double *factor;     ///< per bin: inverse Cholesky factor, l_mm, l_aa, Re l_am, Im l_am
     double *work;
 };
 
@@ -24,14 +24,14 @@ struct evidence {
 bool evidence_init(struct evidence *self, const struct recording *recording, double scale_inertia);
 void evidence_free(struct evidence *self);
 
-/// Estimates the noise under a model: from the scatter of the periods' residuals about their mean, averaged over neighbouring
-/// bins; in a run without periods from the smoothed spectrum of the residual itself, an upper bound.
+/// Estimates the noise under a model: from the scatter of the periods' residuals about their mean, averaged over
+/// neighbouring bins; in a run without periods from the smoothed spectrum of the residual itself, an upper bound.
 /// Equation:  C_k = 1 / (P (P-1)) sum_p (R_p - mean) (R_p - mean)^H, smoothed;  R = DFT / N
 /// Errors: false if memory is short.
 bool evidence_estimate_noise(struct evidence *self, const struct sim_model *model);
 
-/// In a run without periods: the noise from a whitened residual (by the present noise) out of which everything that a black box
-/// can explain has been taken. Nothing is done for periodic runs. Errors: false if memory is short.
+/// In a run without periods: the noise from a whitened residual (by the present noise) out of which everything that a
+/// black box can explain has been taken. Nothing is done for periodic runs. Errors: false if memory is short.
 bool evidence_sharpen_noise(struct evidence *self, const double *whitened);
 
 /// Residual of a model on the block, whitened: independent, unit variance if the model is right.
@@ -39,7 +39,8 @@ bool evidence_sharpen_noise(struct evidence *self, const double *whitened);
 void evidence_residual(const struct evidence *self, const struct sim_model *model, double *out_whitened);
 
 /// Whitens residual signals of the block (actuator NULL: zeros).
-void evidence_whiten(const struct evidence *self, const double *mechanics, const double *actuator, double *out_whitened);
+void evidence_whiten(const struct evidence *self, const double *mechanics, const double *actuator,
+                     double *out_whitened);
 
 /// DFT of one real signal of the block at bins 0..band, divided by its length, tapered if the block is no period;
 /// out: 2 (band + 1) values.

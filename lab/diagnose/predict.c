@@ -4,6 +4,7 @@
 #include "sim/plant.h"
 
 #include <math.h>
+#include <string.h>
 
 struct predictor {
     const struct sim_model *model;
@@ -41,31 +42,50 @@ static double predict_sample(struct predictor *p, size_t n)
     return now;
 }
 
-/// Free motion of the load over t_s with the motor held: x(t) = Phi x(0) for deviations x = (angle, speed) from rest.
-static void free_motion(const struct sim_model *model, double t_s, double out_phi[2][2])
+/// Free motion of the load over one sample, x' = A x for deviations x = (angle, speed): the simulator's own, of a motor
+/// that starts at the measured state and gives way to the belt until the next sample.
+static void free_motion(const struct predictor *p, double out_phi[2][2])
 {
-    double square = model->belt_stiffness_Nm_per_rad / model->load_inertia_kgm2;
-    double alpha = 0.5 * model->belt_damping_Nms_per_rad / model->load_inertia_kgm2;
-    double inside = square - alpha * alpha, rate = sqrt(fabs(inside)), c, s; // c and s / rate carry the decay
-    if (inside > 0.0) {
-        c = exp(-alpha * t_s) * cos(rate * t_s);
-        s = exp(-alpha * t_s) * sin(rate * t_s);
-    } else {
-        c = 0.5 * (exp((rate - alpha) * t_s) + exp(-(rate + alpha) * t_s));
-        s = 0.5 * (exp((rate - alpha) * t_s) - exp(-(rate + alpha) * t_s));
+    struct sim_model linear = *p->model;
+    linear.coulomb_friction_Nm = 0.0;
+    memset(linear.effect_on, 0, sizeof linear.effect_on);
+    for (size_t j = 0; j < 2; j++) {
+        struct sim_plant plant = {.load_position = j == 0, .load_velocity = j == 1};
+        for (size_t i = 0; i < p->stretch->substeps; i++)
+            sim_plant_step(&plant, &linear, 0.0, 1.0 / (linear.sample_rate_hz * (double)p->stretch->substeps));
+        out_phi[0][j] = plant.load_position;
+        out_phi[1][j] = plant.load_velocity;
     }
-    double over = rate > 0.0 ? s / rate : t_s * c;
-    out_phi[0][0] = c + alpha * over;
-    out_phi[0][1] = over;
-    out_phi[1][0] = -square * over;
-    out_phi[1][1] = c - alpha * over;
 }
 
-/// The load's state that repeats after one period: x1 = Phi x0 + c for any start x0, so x* = (I - Phi)^-1 (x1 - Phi x0).
+static void multiply(double a[2][2], double b[2][2], double out[2][2])
+{
+    double c[2][2];
+    for (size_t i = 0; i < 2; i++)
+        for (size_t j = 0; j < 2; j++)
+            c[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j];
+    memcpy(out, c, sizeof c);
+}
+
+/// io_phi to the power of n.
+static void raise(double io_phi[2][2], size_t n)
+{
+    double result[2][2] = {{1.0, 0.0}, {0.0, 1.0}};
+    for (; n > 0; n /= 2) {
+        if (n % 2 == 1)
+            multiply(result, io_phi, result);
+        multiply(io_phi, io_phi, io_phi);
+    }
+    memcpy(io_phi, result, sizeof result);
+}
+
+/// The load's state that repeats after one period: x1 = Phi x0 + c for any start x0, so x* = (I - Phi)^-1 (x1 - Phi
+/// x0).
 static void settle_load(struct predictor *p, double position0, double velocity0)
 {
     double phi[2][2];
-    free_motion(p->model, (double)p->stretch->samples / p->model->sample_rate_hz, phi);
+    free_motion(p, phi);
+    raise(phi, p->stretch->samples);
     double b0 = p->plant.load_position - phi[0][0] * position0 - phi[0][1] * velocity0;
     double b1 = p->plant.load_velocity - phi[1][0] * position0 - phi[1][1] * velocity0;
     double m00 = 1.0 - phi[0][0], m01 = -phi[0][1], m10 = -phi[1][0], m11 = 1.0 - phi[1][1];
@@ -81,7 +101,9 @@ static void warm_up(struct predictor *p)
 {
     size_t samples = p->stretch->samples;
     bool two = p->model->structure == sim_structure_two_mass;
-    size_t history = samples < sim_actuator_history ? samples : sim_actuator_history;
+    const double lags = 40.0; // exp(-40): nothing of the start is left
+    double needed = sim_actuator_history + lags * p->model->torque_lag_s * p->model->sample_rate_hz;
+    size_t history = needed < (double)samples ? (size_t)needed : samples;
     double position0 = p->plant.load_position, velocity0 = p->plant.load_velocity;
     for (size_t n = two ? 0 : samples - history; n < samples; n++)
         predict_sample(p, n);

@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-/// The simulation's one-step prediction of a recording: where diagnosis meets the model, and the only place where it does.
+/// The simulation's one-step prediction of a recording: where diagnosis meets the model, and the only place where it
+/// does.
 #ifndef SERVOSCOPE_DIAGNOSE_PREDICT_H
 #define SERVOSCOPE_DIAGNOSE_PREDICT_H
 
 #include "lab/diagnose/recording.h"
 #include "sim/model.h"
 
-/// Sets the simulated motor to the measured position and speed at every sampling instant and lets the simulator run to the
-/// next one, under the torque that the model's actuator makes of the recorded reference (or under the measured torque where
-/// no reference was recorded). Friction, sticking and whatever effects are on act between the instants as in any simulation;
-/// only the load, which was not measured, keeps its state.
+/// Sets the simulated motor to the measured position and speed at every sampling instant and lets the simulator run to
+/// the next one, under the torque that the model's actuator makes of the recorded reference (or under the measured
+/// torque where no reference was recorded). Friction, sticking and whatever effects are on act between the instants as
+/// in any simulation; only the load, which was not measured, keeps its state.
 /// Equation:  mechanics[n] = J f_s (v_measured[n+1] - v_predicted[n+1]),   J = scale_inertia
 ///            actuator[n]  = torque_measured[n] - torque_predicted[n]
 /// Shapes:    out arrays hold stretch->samples values; out_actuator may be NULL; it is zero without a reference

@@ -42,7 +42,8 @@ static const double *either(const struct run *run, const char *rotary, const cha
 static int refuse_column(const struct run *run, const char *what, const char *rotary, const char *linear,
                          struct error *out_error)
 {
-    return error_set(out_error, error_refused, "%s: no %s: a column %s (or %s on a linear axis) is needed; --map can name one",
+    return error_set(out_error, error_refused,
+                     "%s: no %s: a column %s (or %s on a linear axis) is needed; --map can name one",
                      run->path ? run->path : "run", what, rotary, linear);
 }
 
@@ -140,7 +141,8 @@ static bool torque_power(const struct recording *r, double *out_power)
         }
         fft_forward(plan, time, time + 2 * n);
         for (size_t k = 0; k < n / 2; k++)
-            out_power[k] = time[2 * n + 2 * k] * time[2 * n + 2 * k] + time[2 * n + 2 * k + 1] * time[2 * n + 2 * k + 1];
+            out_power[k] =
+                time[2 * n + 2 * k] * time[2 * n + 2 * k] + time[2 * n + 2 * k + 1] * time[2 * n + 2 * k + 1];
     }
     bool good = time && plan;
     free(time);
@@ -149,8 +151,8 @@ static bool torque_power(const struct recording *r, double *out_power)
     return good;
 }
 
-/// Excited bins: the file's, else those with torque: for a period the bins above a thousandth of the median of the strongest
-/// tenth, for other runs every bin up to the one below which 99.9 % of the torque's power lies.
+/// Excited bins: the file's, else those with torque: for a period the bins above a thousandth of the median of the
+/// strongest tenth, for other runs every bin up to the one below which 99.9 % of the torque's power lies.
 static bool choose_bins(const struct run *run, struct recording *r)
 {
     size_t half = r->block.samples / 2;
@@ -224,7 +226,8 @@ int recording_prepare(const struct run *run, struct recording *out_recording, st
     r->periods = 1;
     const size_t fewest = 64;
     if (run->rows < fewest)
-        return error_set(out_error, error_refused, "%s: %zu rows; diagnosis needs at least %zu", run->path, run->rows, fewest);
+        return error_set(out_error, error_refused, "%s: %zu rows; diagnosis needs at least %zu", run->path, run->rows,
+                         fewest);
     choose_periods(run, r);
     int status = take_columns(run, r, out_error);
     if (status == 0 && !make_block(r, r->periodic ? run->period_samples : smooth_length(run->rows)))

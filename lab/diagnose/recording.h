@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /// A run prepared for diagnosis: what moved, under which torque, in one block to be explained.
-/// Periodic runs: the block is the mean of the counted periods, in which noise is smaller by the root of their number; the
-/// periods themselves stay at hand because their scatter is the noise. Other runs: the block is the whole run.
+/// Periodic runs: the block is the mean of the counted periods, in which noise is smaller by the root of their number;
+/// the periods themselves stay at hand because their scatter is the noise. Other runs: the block is the whole run.
 #ifndef SERVOSCOPE_DIAGNOSE_RECORDING_H
 #define SERVOSCOPE_DIAGNOSE_RECORDING_H
 
@@ -19,25 +19,25 @@ struct stretch {
     double *torque_ref; ///< NULL: the run has none; then the measured torque drives the model
     double *torque;
     double *position;
-    double *velocity;   ///< best estimate from the position and, if there is one, the speed column
+    double *velocity; ///< best estimate from the position and, if there is one, the speed column
 };
 
 struct recording {
     bool linear, periodic;
     double rate_hz;
-    size_t periods;         ///< counted ones; 1 if not periodic
-    struct stretch block;   ///< what has to be explained
-    struct stretch all;     ///< every row of the run
-    size_t lead;            ///< rows of `all` before the counted part
-    size_t bin_count;       ///< excited bins of the block, ascending
+    size_t periods;       ///< counted ones; 1 if not periodic
+    struct stretch block; ///< what has to be explained
+    struct stretch all;   ///< every row of the run
+    size_t lead;          ///< rows of `all` before the counted part
+    size_t bin_count;     ///< excited bins of the block, ascending
     size_t *bins;
-    size_t band;            ///< highest bin of the block that is looked at
+    size_t band; ///< highest bin of the block that is looked at
     struct sim_coverage coverage;
-    char motion_from[160];  ///< one sentence: how the speed was made, with the filter's figures
+    char motion_from[160]; ///< one sentence: how the speed was made, with the filter's figures
 };
 
-/// Prepares a run. Errors: error_refused where a torque or a motion column is missing, fewer than 64 samples are left, or
-/// nothing moves; the message names the file and what was expected.
+/// Prepares a run. Errors: error_refused where a torque or a motion column is missing, fewer than 64 samples are left,
+/// or nothing moves; the message names the file and what was expected.
 int recording_prepare(const struct run *run, struct recording *out_recording, struct error *out_error);
 void recording_free(struct recording *self);
 

@@ -3,7 +3,6 @@
 
 #include "lab/numeric/least_squares.h"
 
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,8 +22,9 @@ struct candidate {
     struct hypothesis hypothesis;
 };
 
-/// The torque that an effect at `values` would have added over the recorded motion, whitened: what the residual would look
-/// like, to first order, without running the simulation. `columns` of them: sine and cosine of an effect with a phase.
+/// The torque that an effect at `values` would have added over the recorded motion, whitened: what the residual would
+/// look like, to first order, without running the simulation. `columns` of them: sine and cosine of an effect with a
+/// phase.
 static size_t quick_columns(const struct fit_data *data, int effect, const double *values, double *signal, double *out)
 {
     const struct sim_effect *e = sim_effects[effect];
@@ -53,8 +53,8 @@ static size_t quick_columns(const struct fit_data *data, int effect, const doubl
     return columns;
 }
 
-/// Cost that would be left if the effect at `io_values` were added, by linear least squares beside the present coordinates.
-/// Its size (and phase) in io_values becomes the best one.
+/// Cost that would be left if the effect at `io_values` were added, by linear least squares beside the present
+/// coordinates. Its size (and phase) in io_values becomes the best one.
 static double quick_cost(const struct fit_data *data, const struct hypothesis *h, const struct fit *fit, int effect,
                          double *io_values, double *work)
 {
@@ -94,8 +94,9 @@ static double quick_cost(const struct fit_data *data, const struct hypothesis *h
 enum { scan_kept = 5 };
 
 /// Scan values worth a real step: all of a short scan, the best few by quick cost of a long one.
-static size_t choose_scan(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *from,
-                          const struct fit *fit, int effect, double out_values[][sim_effect_parameters_max])
+static size_t choose_scan(const struct fit_data *data, const struct sim_coverage *coverage,
+                          const struct hypothesis *from, const struct fit *fit, int effect,
+                          double out_values[][sim_effect_parameters_max])
 {
     struct sim_model current;
     hypothesis_model(from, NULL, &current);
@@ -103,7 +104,8 @@ static size_t choose_scan(const struct fit_data *data, const struct sim_coverage
     double values[sim_effect_parameters_max] = {0}, costs[sim_effect_scan_max];
     size_t count = 0, longest = 0;
     for (size_t i = 0; i < data->runs; i++)
-        longest = data->evidence[i].recording->block.samples > longest ? data->evidence[i].recording->block.samples : longest;
+        longest =
+            data->evidence[i].recording->block.samples > longest ? data->evidence[i].recording->block.samples : longest;
     double *work = NULL;
     bool quick = e->oppose && e->scan(&current, coverage, sim_effect_scan_max, values);
     if (quick) {
@@ -132,10 +134,11 @@ static size_t choose_scan(const struct fit_data *data, const struct sim_coverage
     return count;
 }
 
-/// Where the structure changes, derivatives of the old one are worth nothing: the scan values with the lowest cost as they are
-/// get a short fit of their own.
-static void scan_restructured(struct fit *scratch, const struct fit_data *data, const struct hypothesis *from, int effect,
-                              double values[][sim_effect_parameters_max], size_t count, struct candidate *out)
+/// Where the structure changes, derivatives of the old one are worth nothing: the scan values with the lowest cost as
+/// they are get a short fit of their own.
+static void scan_restructured(struct fit *scratch, const struct fit_data *data, const struct hypothesis *from,
+                              int effect, double values[][sim_effect_parameters_max], size_t count,
+                              struct candidate *out)
 {
     enum { tried = 4 };
     double costs[sim_effect_scan_max];
@@ -204,7 +207,8 @@ static bool can_show(const struct hypothesis *h, const struct sim_coverage *cove
 }
 
 /// One round of forward selection. Returns whether an effect was added.
-static bool add_best(const struct fit_data *data, const struct sim_coverage *coverage, struct hypothesis *io_h, struct fit *fit)
+static bool add_best(const struct fit_data *data, const struct sim_coverage *coverage, struct hypothesis *io_h,
+                     struct fit *fit)
 {
     struct candidate *list = calloc(sim_effects_max, sizeof *list);
     struct fit scratch = {0};
@@ -246,7 +250,8 @@ bool search_add(const struct fit_data *data, const struct sim_coverage *coverage
     return fit_run(out_fit, data, io_hypothesis, refine_iterations);
 }
 
-double search_evidence(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit, int effect)
+double search_evidence(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit,
+                       int effect)
 {
     struct hypothesis without = *hypothesis;
     struct fit trial;
@@ -299,7 +304,8 @@ bool search_run(const struct fit_data *data, const struct sim_coverage *coverage
 {
     if (!fit_run(io_fit, data, io_hypothesis, refine_iterations))
         return false;
-    for (size_t round = 0; round < 2 * options->causes_max && named_count(io_hypothesis) < options->causes_max; round++) {
+    for (size_t round = 0; round < 2 * options->causes_max && named_count(io_hypothesis) < options->causes_max;
+         round++) {
         if (options->progress && !options->progress(options->user, "searching"))
             break;
         drop_unneeded(data, io_hypothesis, io_fit);

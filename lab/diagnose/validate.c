@@ -157,8 +157,9 @@ static bool curves_allocate(struct diagnosis_curves *c, size_t bins, size_t samp
     c->bins = bins;
     c->samples = samples;
     c->curve_points = points;
-    double **per_bin[] = {&c->frequency_hz, &c->torque_Nm, &c->nominal_Nm, &c->refitted_Nm, &c->extended_Nm, &c->two_sigma_Nm};
-    double **per_sample[] = {&c->time_s,           &c->position,          &c->velocity, &c->friction_measured,
+    double **per_bin[] = {&c->frequency_hz, &c->torque_Nm,   &c->nominal_Nm,
+                          &c->refitted_Nm,  &c->extended_Nm, &c->two_sigma_Nm};
+    double **per_sample[] = {&c->time_s,           &c->position,         &c->velocity, &c->friction_measured,
                              &c->residual_nominal, &c->residual_extended};
     double **per_point[] = {&c->curve_velocity, &c->curve_nominal, &c->curve_extended};
     bool good = true;
@@ -172,7 +173,8 @@ static bool curves_allocate(struct diagnosis_curves *c, size_t bins, size_t samp
 }
 
 /// One model's error per bin, and in time the torque it lacks: band-limited, mechanics only.
-static bool model_error(const struct evidence *e, const struct sim_model *model, double *out_per_bin, double *out_in_time)
+static bool model_error(const struct evidence *e, const struct sim_model *model, double *out_per_bin,
+                        double *out_in_time)
 {
     struct spectra s;
     if (!spectra_of(e, model, &s))

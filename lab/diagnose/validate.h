@@ -7,9 +7,12 @@
 #include "lab/diagnose/fit.h"
 
 /// Figures of one model over all runs of `data`, whose noise must have been estimated.
-/// Equation:  nrmse^2 = sum_k (|A_k - M_k|^2 + |A_k|^2) / sum_k |T_k|^2 over the excited bins, with M, A, T the DFTs of the
-///            mechanics residual, the actuator residual and the measured torque. The first term is what the model's torque
-///            for the measured motion is off from the measured torque; the second, there only with a torque reference, is
+/// Equation:  nrmse^2 = sum_k (|A_k - M_k|^2 + |A_k|^2) / sum_k |T_k|^2 over the excited bins, with M, A, T the DFTs of
+///            the
+///            mechanics residual, the actuator residual and the measured torque. The first term is what the model's
+///            torque
+///            for the measured motion is off from the measured torque; the second, there only with a torque reference,
+///            is
 ///            what the model's actuator is off, which the first cannot see.
 ///            whitened_rms^2 = mean of squared whitened residuals.
 struct diagnosis_figures validate_figures(const struct fit_data *data, const struct sim_model *model);

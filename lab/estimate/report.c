@@ -161,9 +161,9 @@ static bool make_drawing(const struct frf *frf, const struct frf_report_options 
     }
     double *rest = out->memory;
     double **const arrays[arrays_of_lines] = {
-        &out->lines.frequency_hz, &out->lines.magnitude_db,  &out->lines.low_db,
-        &out->lines.high_db,      &out->lines.phase_deg,     &out->lines.phase_low_deg,
-        &out->lines.phase_high_deg, &out->lines.std_db,      &out->lines.noise_db,
+        &out->lines.frequency_hz,   &out->lines.magnitude_db, &out->lines.low_db,
+        &out->lines.high_db,        &out->lines.phase_deg,    &out->lines.phase_low_deg,
+        &out->lines.phase_high_deg, &out->lines.std_db,       &out->lines.noise_db,
     };
     for (size_t i = 0; i < arrays_of_lines; i++) {
         *arrays[i] = take(&rest, frf->count);
@@ -201,7 +201,7 @@ static void add_bode(const struct drawing *drawing, const struct frf_report_opti
         figure_add_points(magnitude, "measured", lines->count, lines->frequency_hz, lines->magnitude_db),
         figure_add_points(phase, "", lines->count, lines->frequency_hz, lines->phase_deg)};
     for (size_t i = 0; i < 2; i++) {
-        points[i]->size = 5;
+        points[i]->size = 4;
         points[i]->colour = figure_blue;
     }
     for (size_t c = 0; c < options->curve_count; c++) {
@@ -248,8 +248,8 @@ static void add_sentences(struct page *page, const struct frf *frf, const struct
                           const struct frf_report_options *options)
 {
     const struct lines *lines = &drawing->lines;
-    page_add_paragraph(page, "From %s to %s by method %s, %zu of %zu lines valid.", frf->input, frf->output, frf->method,
-                       lines->count, frf->count);
+    page_add_paragraph(page, "From %s to %s by method %s, %zu of %zu lines valid.", frf->input, frf->output,
+                       frf->method, lines->count, frf->count);
     if (options->curve_count == 0) {
         return;
     }

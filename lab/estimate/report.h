@@ -25,8 +25,8 @@ struct frf_report_options {
     const struct frf_model_curve *curves;
 };
 
-/// Adds a section: magnitude in dB with a band of 2 std, phase, standard deviations (total, and noise where it differs),
-/// and with models the error of each over 2 std, line by line: a perfect model stays below 1.
+/// Adds a section: magnitude in dB with a band of 2 std, phase, standard deviations (total, and noise where it
+/// differs), and with models the error of each over 2 std, line by line: a perfect model stays below 1.
 /// `options` may be NULL. Lines that are not valid are left out and counted.
 /// Errors: if memory is short the figure is replaced by a sentence that says so.
 void frf_report_section(struct page *page, const struct frf *frf, const struct frf_report_options *options);

@@ -25,10 +25,12 @@ void fft_plan_destroy(struct fft_plan *plan)
 
 void fft_forward(const struct fft_plan *plan, const double *in, double *out)
 {
-    plan->forward.transform(reinterpret_cast<const std::complex<double> *>(in), reinterpret_cast<std::complex<double> *>(out));
+    plan->forward.transform(reinterpret_cast<const std::complex<double> *>(in),
+                            reinterpret_cast<std::complex<double> *>(out));
 }
 
 void fft_inverse(const struct fft_plan *plan, const double *in, double *out)
 {
-    plan->inverse.transform(reinterpret_cast<const std::complex<double> *>(in), reinterpret_cast<std::complex<double> *>(out));
+    plan->inverse.transform(reinterpret_cast<const std::complex<double> *>(in),
+                            reinterpret_cast<std::complex<double> *>(out));
 }

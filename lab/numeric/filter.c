@@ -8,8 +8,8 @@
 
 static const double pi = 3.14159265358979324;
 
-/// Section number i of a low-pass with the analogue pole pair re +- j im (for a pass band edge at 1 rad/s) moved to `edge`
-/// by the bilinear transform s = (z-1)/(z+1); gain 1 at DC.
+/// Section number i of a low-pass with the analogue pole pair re +- j im (for a pass band edge at 1 rad/s) moved to
+/// `edge` by the bilinear transform s = (z-1)/(z+1); gain 1 at DC.
 static void set_section(struct filter *f, size_t i, double re, double im, double edge)
 {
     re *= edge;

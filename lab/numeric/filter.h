@@ -23,9 +23,10 @@ struct filter filter_butterworth(size_t order, double cutoff);
 /// (the convention of the usual decimation filters).
 struct filter filter_chebyshev(size_t order, double ripple_db, double cutoff);
 
-/// Filters x forward and backward in place: magnitude squared, no phase shift. Both ends are extended by odd reflection over
-/// 3 orders (6 samples a section), each section starting in the steady state of its first input. How far the ends are
-/// extended decides the last digits of a fit: with this reach the published figures of EMPS come out to every digit.
+/// Filters x forward and backward in place: magnitude squared, no phase shift. Both ends are extended by odd reflection
+/// over 3 orders (6 samples a section), each section starting in the steady state of its first input. How far the ends
+/// are extended decides the last digits of a fit: with this reach the published figures of EMPS come out to every
+/// digit.
 /// Range:  samples > 6 sections
 /// Errors: false if there are fewer samples or memory is short; x is then as it was.
 /// Test:   tests/unit/test_filter.c, tests/golden/test_emps.c

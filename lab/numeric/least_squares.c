@@ -43,8 +43,9 @@ static void normal_equations(size_t rows, size_t columns, const double *A, const
     }
 }
 
-/// Whether columns are independent: the square of a pivot of the factor is what a column of length 1 has of its own, apart
-/// from those before it. Dependent columns leave rounding there, of either sign, so that the factorisation may go through.
+/// Whether columns are independent: the square of a pivot of the factor is what a column of length 1 has of its own,
+/// apart from those before it. Dependent columns leave rounding there, of either sign, so that the factorisation may go
+/// through.
 static bool independent(size_t columns, const double *factor)
 {
     const double own_least = 1e-14;

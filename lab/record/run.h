@@ -16,30 +16,30 @@ struct run_column {
 };
 
 struct run {
-    char *path;               ///< where it was read from, for messages; owned
-    double sample_rate_hz;    ///< > 0 once read
+    char *path;            ///< where it was read from, for messages; owned
+    double sample_rate_hz; ///< > 0 once read
     size_t rows;
-    size_t period_samples;    ///< 0: not periodic, or not said
-    size_t periods;           ///< counted periods after the settling ones; 0: not said
-    size_t settle_periods;    ///< leading periods to leave out
-    bool has_settle_periods;  ///< whether the file said so
+    size_t period_samples;   ///< 0: not periodic, or not said
+    size_t periods;          ///< counted periods after the settling ones; 0: not said
+    size_t settle_periods;   ///< leading periods to leave out
+    bool has_settle_periods; ///< whether the file said so
     size_t bin_count;
-    uint32_t *bins;           ///< excited bins of one period, ascending; NULL: not said
+    uint32_t *bins; ///< excited bins of one period, ascending; NULL: not said
     bool has_table_crc32;
     uint32_t table_crc32;
-    bool linear;              ///< recorded in m and N instead of rad and Nm
+    bool linear; ///< recorded in m and N instead of rad and Nm
     size_t column_count;
     struct run_column *columns;
-    size_t key_count;         ///< every `# key: value` line, known or not, in order, so that nothing is lost
+    size_t key_count; ///< every `# key: value` line, known or not, in order, so that nothing is lost
     struct run_key {
         char *key;
         char *value;
-    } *keys;
+    } * keys;
 };
 
 struct run_options {
-    const char *map;      ///< "torque_Nm=COLUMN[*SCALE],..." or NULL
-    double rate_hz;       ///< 0: from the file
+    const char *map; ///< "torque_Nm=COLUMN[*SCALE],..." or NULL
+    double rate_hz;  ///< 0: from the file
 };
 
 /// Reads a run from a .csv or .csv.gz file (recognised by content, not by name).

@@ -2,8 +2,8 @@
 // All friction is stronger one way than the other: times (1 + a) for positive speed, (1 - a) for negative.
 #include "sim/effect.h"
 
-#include <stdint.h>
 #include <math.h>
+#include <stdint.h>
 #include <stdio.h>
 
 static void asymmetric_oppose(const double *p, const struct sim_motion *motion, struct sim_opposing *io_opposing)
@@ -13,7 +13,8 @@ static void asymmetric_oppose(const double *p, const struct sim_motion *motion, 
     io_opposing->negative_factor *= 1.0 - p[0];
 }
 
-static bool asymmetric_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
+static bool asymmetric_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index,
+                            double *out)
 {
     (void)model;
     (void)coverage;
@@ -23,8 +24,11 @@ static bool asymmetric_scan(const struct sim_model *model, const struct sim_cove
 
 static void asymmetric_say(const struct sim_finding *f, char *out_text, size_t size)
 {
-    snprintf(out_text, size, "Friction is %.3g +- %.2g %% stronger for %s motion than the mean of both directions, and as much weaker the other way.",
-             100.0 * fabs(f->parameters[0]), 100.0 * f->deviations[0], f->parameters[0] > 0.0 ? "positive" : "negative");
+    snprintf(out_text, size,
+             "Friction is %.3g +- %.2g %% stronger for %s motion than the mean of both directions, and as much weaker "
+             "the other way.",
+             100.0 * fabs(f->parameters[0]), 100.0 * f->deviations[0],
+             f->parameters[0] > 0.0 ? "positive" : "negative");
 }
 
 const struct sim_effect sim_effect_asymmetric_friction = {

@@ -10,7 +10,8 @@ static const double turn = 6.283185307179586;
 
 static double series_inertia(const struct sim_model *model)
 {
-    return model->motor_inertia_kgm2 * model->load_inertia_kgm2 / (model->motor_inertia_kgm2 + model->load_inertia_kgm2);
+    return model->motor_inertia_kgm2 * model->load_inertia_kgm2 /
+           (model->motor_inertia_kgm2 + model->load_inertia_kgm2);
 }
 
 /// A rigid model may know only the sum of both inertias: halves are the start of the search then.
@@ -25,7 +26,8 @@ static void elasticity_engage(struct sim_model *model)
 }
 
 /// Resonances from an eighth of the highest line up to four times it; beyond, the belt is rigid to this recording.
-static bool elasticity_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
+static bool elasticity_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index,
+                            double *out)
 {
     const double first = 0.125, growth = 1.25, damping_ratio = 0.03;
     if (index >= sim_effect_scan_max)

@@ -20,8 +20,8 @@ static void cogging_oppose(const double *p, const struct sim_motion *motion, str
     io_opposing->smooth += p[0] * cos(phase_rate(p[2], motion->linear) * motion->position + p[1]);
 }
 
-/// Ripple needs room to show: from 1.5 periods over the covered span, in steps that half a period at its end cannot slip
-/// through, up to 110.
+/// Ripple needs room to show: from 1.5 periods over the covered span, in steps that half a period at its end cannot
+/// slip through, up to 110.
 static bool cogging_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
 {
     const double fewest = 1.5, step = 0.4, most = 110.0;

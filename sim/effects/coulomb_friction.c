@@ -20,8 +20,8 @@ static void coulomb_say(const struct sim_finding *f, char *out_text, size_t size
         snprintf(out_text, size, "Dry (Coulomb) friction is %.4g +- %.2g %s; the model has %.4g %s.", f->parameters[0],
                  f->deviations[0], unit, f->nominal[0], unit);
     else
-        snprintf(out_text, size, "There is dry (Coulomb) friction of %.4g +- %.2g %s; the model has none.", f->parameters[0],
-                 f->deviations[0], unit);
+        snprintf(out_text, size, "There is dry (Coulomb) friction of %.4g +- %.2g %s; the model has none.",
+                 f->parameters[0], f->deviations[0], unit);
 }
 
 const struct sim_effect sim_effect_coulomb_friction = {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The load differs from the model: J dv/dt takes more or less torque, growing with the square of frequency for a motion.
+// The load differs from the model: J dv/dt takes more or less torque, growing with the square of frequency for a
+// motion.
 #include "sim/effect.h"
 #include "sim/model.h"
 

@@ -29,16 +29,18 @@ static bool stribeck_testable(const double *p, const struct sim_coverage *covera
     double low = 0.02 * coverage->velocity_rms, high = 1.2 * coverage->velocity_rms;
     bool shown = p[1] > low && p[1] < high;
     if (!shown)
-        snprintf(out_why, size, "its speed %.3g is outside of %.3g..%.3g, where this motion could show it", p[1], low, high);
+        snprintf(out_why, size, "its speed %.3g is outside of %.3g..%.3g, where this motion could show it", p[1], low,
+                 high);
     return shown;
 }
 
 static void stribeck_say(const struct sim_finding *f, char *out_text, size_t size)
 {
-    snprintf(out_text, size,
-             "Dry friction rises by %.4g +- %.2g %s towards standstill, within about %.3g +- %.2g %s (Stribeck effect).",
-             f->parameters[0], f->deviations[0], f->linear ? "N" : "Nm", f->parameters[1], f->deviations[1],
-             f->linear ? "m/s" : "rad/s");
+    snprintf(
+        out_text, size,
+        "Dry friction rises by %.4g +- %.2g %s towards standstill, within about %.3g +- %.2g %s (Stribeck effect).",
+        f->parameters[0], f->deviations[0], f->linear ? "N" : "Nm", f->parameters[1], f->deviations[1],
+        f->linear ? "m/s" : "rad/s");
 }
 
 const struct sim_effect sim_effect_stribeck_friction = {

@@ -92,6 +92,13 @@ cmp first.csv demo-8/run1.csv || fail "the same seed gives another run"
 # The files are those of the other subcommands.
 "$SERVOSCOPE" frf demo-1/run1.csv --out again.csv --quiet --report frf.html
 cmp <(grep -v '^#' again.csv) <(grep -v '^#' demo-1/frf.csv) || fail "frf gives another response"
+"$SERVOSCOPE" design --rate 1000 --period 200 --lines linear:5:100:5 --limit-force-n 10 --mass 1 --out linear --quiet \
+    --report design.html
+python3 -c '
+import xml.dom.minidom
+for page, section in (("frf.html", "Frequency response"), ("design.html", "Excitation")):
+    assert section in xml.dom.minidom.parse(page).getElementsByTagName("h2")[0].toxml(), page
+' || fail "--report of frf or design"
 "$SERVOSCOPE" measure --drive sim:demo-1/drive.json --table demo-1/excitation1.mst --periods 10 --out again.csv --quiet
 cmp <(grep -v '^#' again.csv) <(grep -v '^#' demo-1/run1.csv) || fail "measure gives another run"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// servoscope demo: the whole story without hardware, from limits to a named cause, each step through the files that the
-/// other subcommands read and write.
+/// servoscope demo: the whole story without hardware, from limits to a named cause, each step through the files that
+/// the other subcommands read and write.
 #include "lab/design/lines.h"
 #include "lab/diagnose/diagnosis.h"
 #include "lab/diagnose/wording.h"
@@ -129,8 +129,8 @@ static int design(struct demo *self, struct error *out_error)
             .seed = 1,
         };
         status = design_run(request, &self->designs[r], out_error);
-        status = status ? status : designing_write(in_folder(self, names[r], prefix), request, &self->designs[r],
-                                                   out_error);
+        status =
+            status ? status : designing_write(in_folder(self, names[r], prefix), request, &self->designs[r], out_error);
     }
     if (!status) {
         tell(self, "designed two multisines, %zu lines to 100 Hz, within %g Nm and %g m/s: %.3f and %.3f Nm effective",
@@ -385,8 +385,8 @@ static int run(int argc, char **argv, const struct command_context *context, str
         {.name = "seed", .kind = option_integer, .target = &demo.seed, .lowest = 0, .highest = 9e15},
         {.name = "out", .kind = option_text, .target = &demo.folder},
     };
-    static int (*const steps[])(struct demo *self, struct error *out_error) = {design,   hide,     measure,
-                                                                               estimate, diagnose, write_page};
+    static int (*const steps[])(struct demo * self, struct error * out_error) = {design,   hide,     measure,
+                                                                                 estimate, diagnose, write_page};
     int status = options_parse(argc, argv, options, sizeof options / sizeof options[0], NULL, out_error);
     status = status ? status : make_folder(&demo, out_error);
     for (size_t i = 0; i < sizeof steps / sizeof steps[0] && !status; i++) {

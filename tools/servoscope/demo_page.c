@@ -84,8 +84,9 @@ static void add_measurement(struct page *page, const struct demo_page *self)
                       peak_of(&self->runs[r], "torque_ref_Nm"), peak_of(&self->runs[r], "velocity_rad_per_s"),
                       lost ? lost : "no");
     }
-    page_add_pair(page, "designed for", "%.3f Nm and %.3f rad/s on a rigid axis without friction; what friction, belt and "
-                  "control add comes on top", self->design->peak.torque_Nm, self->design->peak.velocity_rad_per_s);
+    page_add_pair(page, "designed for",
+                  "%.3f Nm and %.3f rad/s on a rigid axis without friction; friction, belt and control come on top",
+                  self->design->peak.torque_Nm, self->design->peak.velocity_rad_per_s);
     page_end_pairs(page);
 }
 
@@ -120,8 +121,7 @@ int demo_page_write(const char *path, const struct demo_page *self, struct error
     struct atomic_file file;
     FILE *stream = NULL;
     int status = quiet_run_response(&self->hiding->nominal_model, self->table, &nominal, out_error);
-    status = status ? status
-                    : quiet_run_response(&self->diagnosis->extended_model, self->table, &extended, out_error);
+    status = status ? status : quiet_run_response(&self->diagnosis->extended_model, self->table, &extended, out_error);
     if (!status) {
         stream = atomic_file_open(&file, path, out_error);
         status = stream ? 0 : error_refused;

@@ -40,8 +40,8 @@ static double *model_field(struct sim_model *model, const struct sim_parameter *
 }
 
 /// Belt drive of the first paper, halves of its inertia on an elastic belt, with usual friction: resonance in the upper
-/// part of the excited band, where the motor keeps the limits that were designed for one inertia. Where the structure is
-/// what will be hidden, the nominal model is without it.
+/// part of the excited band, where the motor keeps the limits that were designed for one inertia. Where the structure
+/// is what will be hidden, the nominal model is without it.
 static void make_nominal(const struct sim_effect *effect, uint64_t seed, struct sim_model *out)
 {
     const double antiresonance_hz = 66.0, damping_ratio = 0.04;
@@ -57,7 +57,7 @@ static void make_nominal(const struct sim_effect *effect, uint64_t seed, struct 
     if (!effect->engage) {
         const double omega = two_pi * antiresonance_hz;
         out->structure = sim_structure_two_mass;
-            out->belt_damping_Nms_per_rad = 0.001 * round(2.0 * damping_ratio * omega * out->load_inertia_kgm2 / 0.001);
+        out->belt_damping_Nms_per_rad = 0.001 * round(2.0 * damping_ratio * omega * out->load_inertia_kgm2 / 0.001);
         out->belt_stiffness_Nm_per_rad = round(omega * omega * out->load_inertia_kgm2);
     }
 }

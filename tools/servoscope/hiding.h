@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// Hides an effect in a drive, for demonstrations and exercises: a nominal model, and a copy of it in which one thing is
-/// different. Takes any effect of the catalogue; knows none of them by name.
+/// Hides an effect in a drive, for demonstrations and exercises: a nominal model, and a copy of it in which one thing
+/// is different. Takes any effect of the catalogue; knows none of them by name.
 #ifndef SERVOSCOPE_TOOLS_HIDING_H
 #define SERVOSCOPE_TOOLS_HIDING_H
 

@@ -18,8 +18,11 @@ int quiet_run(const struct sim_model *model, const struct msgen_table *table, st
     quiet.sensors.velocity_noise_rad_per_s = 0.0;
     quiet.sensors.torque_noise_Nm = 0.0;
     quiet.sensors.velocity_filter_s = 0.0;
-    const struct measure_plan plan = {
-        .table = table, .mode = drive_mode_cascade, .settle_periods = 2, .periods = 2, .limits = GUARD_REAL_LIMITS_NONE};
+    const struct measure_plan plan = {.table = table,
+                                      .mode = drive_mode_cascade,
+                                      .settle_periods = 2,
+                                      .periods = 2,
+                                      .limits = GUARD_REAL_LIMITS_NONE};
     struct direct_drive simulated;
     struct measure_report report;
     struct drive drive = direct_drive_init(&simulated, &quiet);

@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: MIT */
+/// The excitation section: limits, units and figures are those of the request and the result.
+#include "lab/design/report.h"
+#include "lab/page/page.h"
+
+#include "unity.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const uint32_t bins[] = {1, 2, 3, 4, 5, 6, 7, 8};
+static struct design_request request;
+static struct design_result result;
+static char *text;
+
+void setUp(void)
+{
+    request = (struct design_request){
+        .rate_numerator_hz = 1000,
+        .rate_denominator = 1,
+        .period_samples = 200,
+        .bin_count = sizeof bins / sizeof bins[0],
+        .bins = bins,
+        .limits = {.velocity_rad_per_s = 3.0, .torque_Nm = 1.0},
+        .inertia_kgm2 = 0.01,
+        .method = "newman",
+    };
+}
+
+void tearDown(void)
+{
+    design_result_free(&result);
+    free(text);
+    text = NULL;
+}
+
+static void write_section(void)
+{
+    struct error error;
+    struct page page;
+    size_t size = 0;
+    TEST_ASSERT_EQUAL_MESSAGE(0, design_run(&request, &result, &error), error.message);
+    FILE *stream = open_memstream(&text, &size);
+    TEST_ASSERT_NOT_NULL(stream);
+    page_start(&page, stream, "test", NULL);
+    design_report_section(&page, &request, &result);
+    TEST_ASSERT_EQUAL(0, page_end(&page, NULL));
+    fclose(stream);
+}
+
+static void says(const char *part)
+{
+    TEST_ASSERT_TRUE_MESSAGE(strstr(text, part) != NULL, part);
+}
+
+static void test_design_report_shows_limits_and_figures(void)
+{
+    char effective[64], start[64];
+    write_section();
+    snprintf(effective, sizeof effective, "effective torque %.4f Nm", result.effective_torque_Nm);
+    snprintf(start, sizeof start, "from sample %zu of the table", result.start_index);
+    says(effective);
+    says(start);
+    says("limits ±1<");
+    says("limits ±3<");
+    says("velocity in rad/s");
+    says("8, 5 to 40 Hz");
+    says("the zero crossing of the velocity");
+    TEST_ASSERT_NULL(strstr(text, "acceleration in rad/s²")); // no limit of its own: no panel
+}
+
+static void test_design_report_gives_acceleration_a_panel_if_limited(void)
+{
+    request.limits.acceleration_rad_per_s2 = 50.0;
+    write_section();
+    says("acceleration in rad/s²");
+    says("limits ±50<");
+}
+
+static void test_design_report_shows_a_linear_axis_in_its_units(void)
+{
+    request.linear = true;
+    request.start = design_start_none;
+    write_section();
+    says("effective force");
+    says("force in N");
+    says("velocity in m/s");
+    says("moved mass");
+    TEST_ASSERT_NULL(strstr(text, "rad"));
+    TEST_ASSERT_NULL(strstr(text, "zero crossing"));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_design_report_shows_limits_and_figures);
+    RUN_TEST(test_design_report_gives_acceleration_a_panel_if_limited);
+    RUN_TEST(test_design_report_shows_a_linear_axis_in_its_units);
+    return UNITY_END();
+}
