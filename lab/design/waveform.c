@@ -31,9 +31,12 @@ static bool cannot_bind(const struct design_spectrum *spectrum, enum design_sign
 static double unit_of(const struct design_spectrum *spectrum, enum design_waveform_kind kind, enum design_signal signal)
 {
     switch (kind) {
-    case design_waveform_limited: return spectrum->limit[signal];
-    case design_waveform_acceleration: return design_spectrum_rms(spectrum, signal);
-    case design_waveform_physical: break;
+    case design_waveform_limited:
+        return spectrum->limit[signal];
+    case design_waveform_acceleration:
+        return design_spectrum_rms(spectrum, signal);
+    case design_waveform_physical:
+        break;
     }
     return 1;
 }
@@ -41,9 +44,12 @@ static double unit_of(const struct design_spectrum *spectrum, enum design_wavefo
 static bool carries(const struct design_spectrum *spectrum, enum design_waveform_kind kind, enum design_signal signal)
 {
     switch (kind) {
-    case design_waveform_limited: return isfinite(spectrum->limit[signal]) && !cannot_bind(spectrum, signal);
-    case design_waveform_acceleration: return signal == design_acceleration;
-    case design_waveform_physical: break;
+    case design_waveform_limited:
+        return isfinite(spectrum->limit[signal]) && !cannot_bind(spectrum, signal);
+    case design_waveform_acceleration:
+        return signal == design_acceleration;
+    case design_waveform_physical:
+        break;
     }
     return true;
 }

@@ -40,9 +40,8 @@ struct diagnosis_untestable {
 
 /// How well one model does on the validation data.
 struct diagnosis_figures {
-    double
-        validation_nrmse; ///< see DESIGN: torque the model lacks or misplaces, excited band, over the measured torque's RMS
-    double whitened_rms; ///< one-step prediction errors over their expected standard deviation
+    double validation_nrmse; ///< torque that the model lacks or misplaces, over the measured torque's RMS; validate.h
+    double whitened_rms;     ///< one-step prediction errors over their expected standard deviation
 };
 
 /// Curves for the report, from the validation data. All arrays are owned and have the stated number of values.
@@ -55,7 +54,7 @@ struct diagnosis_curves {
     size_t samples;                                 ///< of one block
     double rate_hz;
     double *time_s, *position, *velocity;
-    double *friction_measured; ///< torque left after inertia, belt and what depends on position
+    double *friction_measured;                    ///< torque left after inertia, belt and what depends on position
     double *residual_nominal, *residual_extended; ///< Nm, excited band
     size_t curve_points;
     double *curve_velocity, *curve_nominal, *curve_extended; ///< friction against speed as the models have it

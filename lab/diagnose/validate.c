@@ -74,6 +74,7 @@ struct diagnosis_figures validate_figures(const struct fit_data *data, const str
         struct spectra s;
         if (!spectra_of(e, model, &s))
             return figures;
+        error += 0.5 * error_at(e, &s, 0); // the constant part is real: half of what a line of its size is
         for (size_t j = 0; j < e->recording->bin_count; j++) {
             size_t k = e->recording->bins[j];
             error += error_at(e, &s, k);
@@ -108,6 +109,7 @@ double validate_noise_floor(const struct fit_data *data, const struct sim_model 
         size_t highest = r->bins[r->bin_count - 1], count = 0;
         for (size_t k = highest + 1; k <= r->band; k++, count++)
             above += floor_at(e, share, k);
+        floor += 0.5 * floor_at(e, share, 0);
         for (size_t j = 0; j < r->bin_count; j++) {
             size_t k = r->bins[j];
             floor += r->periodic || count == 0 ? floor_at(e, share, k) : above / (double)count;

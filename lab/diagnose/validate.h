@@ -7,7 +7,8 @@
 #include "lab/diagnose/fit.h"
 
 /// Figures of one model over all runs of `data`, whose noise must have been estimated.
-/// Equation:  nrmse^2 = sum_k (|A_k - M_k|^2 + |A_k|^2) / sum_k |T_k|^2 over the excited bins, with M, A, T the DFTs of
+/// Equation:  nrmse^2 = sum_k (|A_k - M_k|^2 + |A_k|^2) / sum_k |T_k|^2 over the excited bins and, at half
+///            weight, the constant part (gravity and friction's asymmetry live there), with M, A, T the DFTs of
 ///            the
 ///            mechanics residual, the actuator residual and the measured torque. The first term is what the model's
 ///            torque

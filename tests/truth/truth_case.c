@@ -123,7 +123,9 @@ static void hide_friction(struct truth_case *self, struct truth_random *random)
         truth->asymmetry_ratio =
             fmax(-0.9, fmin(0.9, self->size * truth_random_uniform(random, 0.1, 0.35) * truth_random_sign(random)));
         break;
-    default: truth->bias_Nm = self->size * truth_random_uniform(random, 0.01, 0.08) * truth_random_sign(random); break;
+    default:
+        truth->bias_Nm = self->size * truth_random_uniform(random, 0.01, 0.08) * truth_random_sign(random);
+        break;
     }
 }
 
@@ -194,15 +196,24 @@ static void hide(struct truth_case *self, struct truth_random *random)
     switch (self->kind) {
     case truth_kind_inertia:
     case truth_kind_belt_elasticity:
-    case truth_kind_cogging: hide_mechanics(self, random); break;
+    case truth_kind_cogging:
+        hide_mechanics(self, random);
+        break;
     case truth_kind_torque_lag:
-    case truth_kind_dead_time: hide_actuator(self, random); break;
+    case truth_kind_dead_time:
+        hide_actuator(self, random);
+        break;
     case truth_kind_quadratic_drag:
     case truth_kind_position_friction:
-    case truth_kind_torque_constant: hide_unknown(self, random); break;
+    case truth_kind_torque_constant:
+        hide_unknown(self, random);
+        break;
     case truth_kind_clean:
-    case truth_kind_count: break;
-    default: hide_friction(self, random); break;
+    case truth_kind_count:
+        break;
+    default:
+        hide_friction(self, random);
+        break;
     }
 }
 

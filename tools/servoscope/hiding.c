@@ -36,7 +36,7 @@ static double log_uniform(uint64_t random[4], double low, double high)
 
 static double *model_field(struct sim_model *model, const struct sim_parameter *parameter)
 {
-    return parameter->model_offset == SIZE_MAX ? NULL : (double *)((char *)model + parameter->model_offset);
+    return parameter->model_offset == SIZE_MAX ? NULL : (double *)(void *)((char *)model + parameter->model_offset);
 }
 
 /// Belt drive of the first paper, halves of its inertia on an elastic belt, with usual friction: resonance in the upper

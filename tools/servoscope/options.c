@@ -82,8 +82,10 @@ static int store_value(const struct option *option, const char *text, struct err
         }
         *(const char **)option->target = text;
         return 0;
-    case option_list: return append_value(option->target, what, text, out_error);
-    case option_flag: break;
+    case option_list:
+        return append_value(option->target, what, text, out_error);
+    case option_flag:
+        break;
     }
     return error_set(out_error, error_usage, "%s takes no value, got '%s'", what, text);
 }
