@@ -2,6 +2,7 @@
 #include "lab/diagnose/recording.h"
 
 #include "lab/diagnose/motion.h"
+#include "lab/estimate/period_search.h"
 #include "lab/numeric/fft.h"
 #include "sim/plant.h"
 
@@ -64,19 +65,35 @@ static int take_columns(const struct run *run, struct recording *r, struct error
     r->all.position = malloc(rows * sizeof(double));
     r->all.velocity = malloc(rows * sizeof(double));
     if (!r->all.torque || (reference && !r->all.torque_ref) || !r->all.position || !r->all.velocity ||
-        !motion_estimate(rows, run->sample_rate_hz, position, velocity, r->periodic ? run->period_samples : 0, &r->all,
+        !motion_estimate(rows, run->sample_rate_hz, position, velocity, r->periodic ? r->block.samples : 0, &r->all,
                          r->motion_from, sizeof r->motion_from))
         return error_set(out_error, error_refused, "%s: not enough memory for %zu rows", run->path, rows);
     return 0;
 }
 
+/// The run's own word, else what its torque repeats after; only a repetition as good as a multisine's is believed.
+static size_t find_period(const struct run *run)
+{
+    const double nearly_exact = 0.99;
+    const double *reference = either(run, "torque_ref_Nm", "force_ref_N");
+    const double *torque = either(run, "torque_Nm", "force_N");
+    struct period_search search;
+    if (run->period_samples > 0)
+        return run->period_samples;
+    if (!torque || period_search_run(reference ? reference : torque, run->rows, &search) != period_search_ok)
+        return 0;
+    return search.correlation >= nearly_exact ? search.period_samples : 0;
+}
+
 /// Periods that count: after the settling ones and, unless the file says how many settled, after the first.
 static void choose_periods(const struct run *run, struct recording *r)
 {
-    size_t n = run->period_samples;
-    r->periodic = n >= 16 && run->rows >= 3 * n;
+    size_t n = find_period(run);
+    const size_t shortest = 16, fewest = 3;
+    r->periodic = n >= shortest && run->rows >= fewest * n;
     if (!r->periodic)
         return;
+    r->block.samples = n;
     size_t available = run->rows / n;
     size_t settle = run->has_settle_periods ? run->settle_periods : 0;
     if (settle == 0 && available >= 3)
@@ -159,7 +176,7 @@ static bool choose_bins(const struct run *run, struct recording *r)
     r->bins = malloc(half * sizeof *r->bins);
     double *power = malloc(half * sizeof *power);
     bool good = r->bins && power && torque_power(r, power);
-    if (good && r->periodic && run->bin_count > 0) {
+    if (good && r->periodic && run->bin_count > 0 && run->period_samples == r->block.samples) {
         for (size_t i = 0; i < run->bin_count && run->bins[i] < half; i++)
             r->bins[r->bin_count++] = run->bins[i];
     } else if (good) {
@@ -230,7 +247,7 @@ int recording_prepare(const struct run *run, struct recording *out_recording, st
                          fewest);
     choose_periods(run, r);
     int status = take_columns(run, r, out_error);
-    if (status == 0 && !make_block(r, r->periodic ? run->period_samples : smooth_length(run->rows)))
+    if (status == 0 && !make_block(r, r->periodic ? r->block.samples : smooth_length(run->rows)))
         status = error_set(out_error, error_refused, "%s: not enough memory", run->path);
     if (status == 0 && !choose_bins(run, r))
         status = error_set(out_error, error_refused, "%s: the torque is constant: nothing was excited", run->path);

@@ -21,8 +21,9 @@ static bool inertia_scan(const struct sim_model *model, const struct sim_coverag
 static void inertia_say(const struct sim_finding *f, char *out_text, size_t size)
 {
     const char *unit = f->linear ? "kg" : "kg m2";
-    snprintf(out_text, size, "The load moves %s than the model says: %.4g +- %.2g %s instead of %.4g %s.",
-             f->parameters[0] > f->nominal[0] ? "more mass" : "less mass", f->parameters[0], f->deviations[0], unit,
+    snprintf(out_text, size, "%s is %s than the model says: %.4g +- %.2g %s instead of %.4g %s.",
+             f->linear ? "The moved mass" : "The load's inertia",
+             f->parameters[0] > f->nominal[0] ? "larger" : "smaller", f->parameters[0], f->deviations[0], unit,
              f->nominal[0], unit);
 }
 

@@ -392,7 +392,7 @@ const struct command command_cmd_diagnose = {
             "  --model M.json       the simulation to be judged (default: a rigid body without friction)\n"
             "  --json-out D.json    the diagnosis as a file; --json prints the same object\n"
             "  --report R.html      one page with figures\n"
-            "  --extended M.json    the model with the causes, for servoscope simulate and drive\n"
+            "  --extended M.json    the model with the causes, for servoscope simulate and measure --drive sim:M.json\n"
             "  --map NAME=COLUMN[*SCALE],...  --rate HZ    for recordings of others; hold for every run named\n"
             "\n"
             "A cause is named only if the data cannot do without it; what has no name stays \"unexplained\". Error is "
