@@ -129,9 +129,20 @@ static void test_recording_measures_what_was_covered(void)
     TEST_ASSERT_TRUE(strlen(recording.motion_from) > 20);
 }
 
+static void test_recording_finds_a_period_that_the_file_does_not_say(void)
+{
+    run.period_samples = 0;
+    prepare();
+    TEST_ASSERT_TRUE(recording.periodic);
+    TEST_ASSERT_EQUAL_UINT(period, recording.block.samples);
+    TEST_ASSERT_EQUAL_UINT(periods - 1, recording.periods);
+}
+
 static void test_recording_without_periods_is_one_block(void)
 {
     run.period_samples = 0;
+    for (size_t n = 0; n < rows; n++) // a sweep: repeats nowhere
+        torque[n] = 0.5 + cos(two_pi * 30.0 * (double)n / rows * (double)n / rows);
     prepare();
     TEST_ASSERT_FALSE(recording.periodic);
     TEST_ASSERT_EQUAL_UINT(1, recording.periods);
@@ -205,6 +216,7 @@ int main(void)
     RUN_TEST(test_recording_block_is_the_mean_of_the_counted_periods);
     RUN_TEST(test_recording_finds_the_excited_bins_or_takes_the_files);
     RUN_TEST(test_recording_measures_what_was_covered);
+    RUN_TEST(test_recording_finds_a_period_that_the_file_does_not_say);
     RUN_TEST(test_recording_without_periods_is_one_block);
     RUN_TEST(test_recording_takes_the_reference_and_a_linear_axis);
     RUN_TEST(test_recording_refuses_a_run_without_torque);
