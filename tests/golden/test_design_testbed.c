@@ -148,6 +148,7 @@ static double judge_samples(const char *options)
     double used = fmax(largest(column[1]) / torque_limit_Nm, largest(column[3]) / velocity_limit_rad_per_s);
     TEST_ASSERT_TRUE(used <= 1 + printed);
     TEST_ASSERT_TRUE(used > 0.9999); // and one limit is reached
+    printf("%-52s effective %.4f Nm, largest use of a limit %.6f\n", options, effective_torque(), used);
     return effective_torque();
 }
 
@@ -192,6 +193,8 @@ static void test_testbed_default_holds_limits_between_the_samples(void)
         evaluate(n * 0.001 / between, q);
         used = fmax(used, fmax(fabs(q[1]) / velocity_limit_rad_per_s, fabs(q[2]) * inertia_kgm2 / torque_limit_Nm));
     }
+    printf("%-52s effective %.4f Nm, largest use of a limit %.6f between the samples\n", "(default)",
+           effective_torque(), used);
     TEST_ASSERT_TRUE(used <= 1);
     TEST_ASSERT_TRUE(used > 0.999);
     TEST_ASSERT_TRUE(effective_torque() >= 0.705); // 1 kHz L-infinity scaled down until it holds: 0.696
