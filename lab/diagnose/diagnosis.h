@@ -63,7 +63,7 @@ struct diagnosis_curves {
 struct diagnosis {
     enum diagnosis_verdict verdict;
     bool linear, model_given, held_back; ///< held_back: validated on the last part of the only run
-    char runs[512], motion_from[200];    ///< what was fitted; one sentence on the filtering
+    char runs[512], motion_from[280];    ///< what was fitted; one sentence on the filtering
     struct sim_model given, refitted_model, extended_model;
     struct model_deviations deviations; ///< of extended_model
     size_t cause_count, candidate_count, tie_count, untestable_count;

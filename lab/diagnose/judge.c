@@ -90,7 +90,7 @@ static void describe_rest(const struct blackbox *box, const struct fit_data *dat
 static void judge_names(const struct blackbox *box, const struct fit_data *data, const struct sim_coverage *coverage,
                         const struct hypothesis *h, const struct fit *fit, struct judgement *j)
 {
-    const double least_share = 0.004; // of the torque's RMS: less is not worth a name even if it is significant
+    const double least_share = 0.0015; // of the torque's RMS: less is not worth a name even if it is significant
     // How far a cause has to outweigh what stays unexplained. Beside a given model a name says what changed, and a term
     // of the wrong shape gains a hundred times what it leaves. Without a model it says what is there at all.
     const double dominance = h->inertia_free ? 5.0 : 1000.0;

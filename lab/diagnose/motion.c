@@ -69,17 +69,24 @@ static struct agreement compare_speed(size_t n, const double *derivative, const 
     return a;
 }
 
-/// v + L (d - v) with the zero-phase first-order low-pass L, forward and backward.
+/// v + L (d - v) with L first-order low-passes, twice forward and twice backward: no phase shift, and steep enough that
+/// nothing of the position's images is left in the upper part of the band.
 static void blend(size_t n, double omega, const double *derivative, const double *velocity, double *out)
 {
-    double keep = exp(-omega), state = 0.0;
-    for (size_t i = 0; i < n; i++) {
-        state = keep * state + (1.0 - keep) * (derivative[i] - velocity[i]);
-        out[i] = state;
-    }
-    for (size_t i = n; i-- > 0;) {
-        state = keep * state + (1.0 - keep) * out[i];
-        out[i] = state;
+    double keep = exp(-omega);
+    for (size_t i = 0; i < n; i++)
+        out[i] = derivative[i] - velocity[i];
+    for (int pass = 0; pass < 2; pass++) {
+        double state = 0.0;
+        for (size_t i = 0; i < n; i++) {
+            state = keep * state + (1.0 - keep) * out[i];
+            out[i] = state;
+        }
+        state = 0.0;
+        for (size_t i = n; i-- > 0;) {
+            state = keep * state + (1.0 - keep) * out[i];
+            out[i] = state;
+        }
     }
     for (size_t i = 0; i < n; i++)
         out[i] += velocity[i];

@@ -125,13 +125,13 @@ static double *residuals_of_all(const struct evidence *self, const struct sim_mo
 static void scatter_of_periods(const struct evidence *self, const double *both, double *spectra, double *raw)
 {
     const struct recording *r = self->recording;
-    size_t n = r->block.samples, bins = r->band + 1, rows = r->all.samples, P = r->periods;
+    size_t bins = r->band + 1, rows = r->all.samples, P = r->periods;
     double *mean = spectra + P * 4 * bins;
     memset(mean, 0, 4 * bins * sizeof *mean);
     for (size_t p = 0; p < P; p++) {
         double *m = spectra + p * 4 * bins;
-        evidence_transform(self, both + r->lead + p * n, m);
-        evidence_transform(self, both + rows + r->lead + p * n, m + 2 * bins);
+        evidence_transform(self, both + r->starts[p], m);
+        evidence_transform(self, both + rows + r->starts[p], m + 2 * bins);
         for (size_t i = 0; i < 4 * bins; i++)
             mean[i] += m[i] / (double)P;
     }

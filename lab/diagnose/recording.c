@@ -24,6 +24,7 @@ void recording_free(struct recording *self)
     stretch_free(&self->block);
     stretch_free(&self->all);
     free(self->bins);
+    free(self->starts);
     memset(self, 0, sizeof *self);
 }
 
@@ -107,7 +108,7 @@ static void choose_periods(const struct run *run, struct recording *r)
 }
 
 /// Mean over the counted periods; the whole run, cut to a length that transforms fast, if there are none.
-static bool average(const double *all, size_t lead, size_t n, size_t periods, double **out_mean)
+static bool average(const struct recording *r, const double *all, size_t n, double **out_mean)
 {
     *out_mean = NULL;
     if (!all)
@@ -115,9 +116,9 @@ static bool average(const double *all, size_t lead, size_t n, size_t periods, do
     double *mean = calloc(n, sizeof *mean);
     if (!mean)
         return false;
-    for (size_t p = 0; p < periods; p++)
+    for (size_t p = 0; p < r->periods; p++)
         for (size_t i = 0; i < n; i++)
-            mean[i] += all[lead + p * n + i] / (double)periods;
+            mean[i] += all[r->starts[p] + i] / (double)r->periods;
     *out_mean = mean;
     return true;
 }
@@ -125,10 +126,33 @@ static bool average(const double *all, size_t lead, size_t n, size_t periods, do
 static bool make_block(struct recording *r, size_t n)
 {
     r->block.samples = n;
-    return average(r->all.torque_ref, r->lead, n, r->periods, &r->block.torque_ref) &&
-           average(r->all.torque, r->lead, n, r->periods, &r->block.torque) &&
-           average(r->all.position, r->lead, n, r->periods, &r->block.position) &&
-           average(r->all.velocity, r->lead, n, r->periods, &r->block.velocity);
+    return average(r, r->all.torque_ref, n, &r->block.torque_ref) && average(r, r->all.torque, n, &r->block.torque) &&
+           average(r, r->all.position, n, &r->block.position) && average(r, r->all.velocity, n, &r->block.velocity);
+}
+
+/// Counted periods without a lost sample. A run without periods cannot leave anything out.
+static int choose_starts(const struct run *run, struct recording *r, struct error *out_error)
+{
+    const double *valid = run_column(run, "valid");
+    size_t n = r->periodic ? r->block.samples : run->rows, kept = 0, lost = 0;
+    r->starts = calloc(r->periods, sizeof *r->starts);
+    if (!r->starts)
+        return error_set(out_error, error_refused, "%s: not enough memory", run->path);
+    for (size_t p = 0; p < r->periods; p++) {
+        size_t start = r->lead + p * n, gaps = 0;
+        for (size_t i = start; valid && i < start + n; i++)
+            gaps += valid[i] == 0.0;
+        lost += gaps;
+        if (gaps == 0)
+            r->starts[kept++] = start;
+    }
+    size_t fewest = r->periodic ? 2 : 1, counted = r->periods;
+    r->periods = kept;
+    if (kept >= fewest)
+        return 0;
+    return error_set(out_error, error_refused,
+                     "%s: %zu samples were lost and spoil %zu of %zu periods; diagnosis needs %zu", run->path, lost,
+                     counted - kept, counted, fewest);
 }
 
 static size_t smooth_length(size_t most)
@@ -168,29 +192,34 @@ static bool torque_power(const struct recording *r, double *out_power)
     return good;
 }
 
-/// Excited bins: the file's, else those with torque: for a period the bins above a thousandth of the median of the
-/// strongest tenth, for other runs every bin up to the one below which 99.9 % of the torque's power lies.
+/// Bins with torque: of a period those above 1e-4 of the strongest in power, of another run every bin up to the one
+/// below which 99.9 % of the power lies.
+static void find_bins(struct recording *r, const double *power, size_t half)
+{
+    double total = 0.0, sum = 0.0, strongest = 0.0;
+    for (size_t k = 1; k < half; k++) {
+        total += power[k];
+        strongest = fmax(strongest, power[k]);
+    }
+    for (size_t k = 1; k < half && sum < 0.999 * total; k++) {
+        sum += power[k];
+        if (!r->periodic || power[k] > 1e-4 * strongest)
+            r->bins[r->bin_count++] = k;
+    }
+}
+
+/// Excited bins: the file's, else those that have torque.
 static bool choose_bins(const struct run *run, struct recording *r)
 {
     size_t half = r->block.samples / 2;
+    bool said = r->periodic && run->bin_count > 0 && run->period_samples == r->block.samples;
     r->bins = malloc(half * sizeof *r->bins);
     double *power = malloc(half * sizeof *power);
-    bool good = r->bins && power && torque_power(r, power);
-    if (good && r->periodic && run->bin_count > 0 && run->period_samples == r->block.samples) {
-        for (size_t i = 0; i < run->bin_count && run->bins[i] < half; i++)
-            r->bins[r->bin_count++] = run->bins[i];
-    } else if (good) {
-        double total = 0.0, sum = 0.0, strongest = 0.0;
-        for (size_t k = 1; k < half; k++) {
-            total += power[k];
-            strongest = fmax(strongest, power[k]);
-        }
-        for (size_t k = 1; k < half && sum < 0.999 * total; k++) {
-            sum += power[k];
-            if (!r->periodic || power[k] > 1e-4 * strongest)
-                r->bins[r->bin_count++] = k;
-        }
-    }
+    bool good = r->bins && power && (said || torque_power(r, power));
+    for (size_t i = 0; good && said && i < run->bin_count && run->bins[i] < half; i++)
+        r->bins[r->bin_count++] = run->bins[i];
+    if (good && !said)
+        find_bins(r, power, half);
     free(power);
     return good && r->bin_count > 0;
 }
@@ -208,6 +237,14 @@ static void choose_substeps(struct recording *r)
 {
     bool slow = !r->block.torque_ref && 20 * r->band < r->block.samples;
     r->block.substeps = r->all.substeps = slow ? 1 : sim_substeps;
+}
+
+static double torque_peak(const struct stretch *block)
+{
+    double peak = 0.0;
+    for (size_t i = 0; i < block->samples; i++)
+        peak = fmax(peak, fabs(block->torque[i]));
+    return peak;
 }
 
 static void measure_coverage(struct recording *r)
@@ -234,6 +271,15 @@ static void measure_coverage(struct recording *r)
     };
 }
 
+/// Adds to the sentence on the motion that the period is a finding of ours.
+static void say_period(struct recording *r)
+{
+    size_t used = strlen(r->motion_from);
+    snprintf(r->motion_from + used, sizeof r->motion_from - used,
+             " The run repeats every %zu samples: noise is averaged over %zu repetitions instead of being filtered.",
+             r->block.samples, r->periods);
+}
+
 int recording_prepare(const struct run *run, struct recording *out_recording, struct error *out_error)
 {
     struct recording *r = out_recording;
@@ -247,6 +293,10 @@ int recording_prepare(const struct run *run, struct recording *out_recording, st
                          fewest);
     choose_periods(run, r);
     int status = take_columns(run, r, out_error);
+    if (r->periodic && run->period_samples == 0)
+        say_period(r);
+    if (status == 0)
+        status = choose_starts(run, r, out_error);
     if (status == 0 && !make_block(r, r->periodic ? r->block.samples : smooth_length(run->rows)))
         status = error_set(out_error, error_refused, "%s: not enough memory", run->path);
     if (status == 0 && !choose_bins(run, r))
@@ -255,7 +305,10 @@ int recording_prepare(const struct run *run, struct recording *out_recording, st
         choose_band(r);
         choose_substeps(r);
         measure_coverage(r);
-        if (!(r->coverage.velocity_rms > 0.0 && r->coverage.position_span > 0.0))
+        const double rounding = 1e-9; // of the largest torque: less is the sum's, not the motor's
+        if (!(r->coverage.torque_rms > rounding * torque_peak(&r->block)))
+            status = error_set(out_error, error_refused, "%s: the torque is constant: nothing was excited", run->path);
+        else if (!(r->coverage.velocity_rms > 0.0 && r->coverage.position_span > 0.0))
             status = error_set(out_error, error_refused, "%s: the axis does not move", run->path);
     }
     if (status != 0)

@@ -29,11 +29,12 @@ struct recording {
     struct stretch block; ///< what has to be explained
     struct stretch all;   ///< every row of the run
     size_t lead;          ///< rows of `all` before the counted part
+    size_t *starts;       ///< first row of each counted period; those with lost samples are not among them
     size_t bin_count;     ///< excited bins of the block, ascending
     size_t *bins;
     size_t band; ///< highest bin of the block that is looked at
     struct sim_coverage coverage;
-    char motion_from[160]; ///< one sentence: how the speed was made, with the filter's figures
+    char motion_from[280]; ///< one sentence: how the speed was made, with the filter's figures
 };
 
 /// Prepares a run. Errors: error_refused where a torque or a motion column is missing, fewer than 64 samples are left,

@@ -91,9 +91,58 @@ static double quick_cost(const struct fit_data *data, const struct hypothesis *h
     return cost;
 }
 
-enum { scan_kept = 5 };
+enum { scan_kept = 6 };
 
-/// Scan values worth a real step: all of a short scan, the best few by quick cost of a long one.
+struct scan_point {
+    double cost;
+    double values[sim_effect_parameters_max];
+};
+
+static int by_point_cost(const void *a, const void *b)
+{
+    double x = ((const struct scan_point *)a)->cost, y = ((const struct scan_point *)b)->cost;
+    return (x > y) - (x < y);
+}
+
+static size_t longest_block(const struct fit_data *data)
+{
+    size_t longest = 0;
+    for (size_t i = 0; i < data->runs; i++) {
+        size_t samples = data->evidence[i].recording->block.samples;
+        longest = samples > longest ? samples : longest;
+    }
+    return longest;
+}
+
+/// The best few of a long scan by quick cost, each the lowest of its neighbourhood: a ripple's cost has a deep valley
+/// for every cycle more or less over the travel, and the right one may be narrow.
+static size_t choose_valleys(const struct fit_data *data, const struct hypothesis *from, const struct fit *fit,
+                             int effect, struct scan_point *points, size_t total,
+                             double out_values[][sim_effect_parameters_max])
+{
+    size_t valleys = 0;
+    double *work = malloc((data->values * (from->count + 3) + longest_block(data)) * sizeof *work);
+    if (!work)
+        return 0;
+    memcpy(work, fit->jacobian, data->values * from->count * sizeof *work);
+    for (size_t i = 0; i < total; i++)
+        points[i].cost = quick_cost(data, from, fit, effect, points[i].values, work);
+    free(work);
+    double before = INFINITY;
+    for (size_t i = 0; i < total; i++) {
+        double here = points[i].cost, after = i + 1 < total ? points[i + 1].cost : INFINITY;
+        if (here <= before && here < after)
+            points[valleys++] = points[i];
+        before = here;
+    }
+    qsort(points, valleys, sizeof *points, by_point_cost);
+    size_t count = valleys < scan_kept ? valleys : scan_kept;
+    for (size_t i = 0; i < count; i++)
+        memcpy(out_values[i], points[i].values, sizeof points[i].values);
+    return count;
+}
+
+/// Scan values worth a real step: all of a short scan, the best valleys of a long one.
 static size_t choose_scan(const struct fit_data *data, const struct sim_coverage *coverage,
                           const struct hypothesis *from, const struct fit *fit, int effect,
                           double out_values[][sim_effect_parameters_max])
@@ -101,36 +150,22 @@ static size_t choose_scan(const struct fit_data *data, const struct sim_coverage
     struct sim_model current;
     hypothesis_model(from, NULL, &current);
     const struct sim_effect *e = sim_effects[effect];
-    double values[sim_effect_parameters_max] = {0}, costs[sim_effect_scan_max];
-    size_t count = 0, longest = 0;
-    for (size_t i = 0; i < data->runs; i++)
-        longest =
-            data->evidence[i].recording->block.samples > longest ? data->evidence[i].recording->block.samples : longest;
-    double *work = NULL;
-    bool quick = e->oppose && e->scan(&current, coverage, sim_effect_scan_max, values);
-    if (quick) {
-        work = malloc((data->values * (from->count + 3) + longest) * sizeof *work);
-        if (!work)
-            return 0;
-        memcpy(work, fit->jacobian, data->values * from->count * sizeof *work);
+    double values[sim_effect_parameters_max] = {0};
+    size_t total = 0, count = 0;
+    while (e->scan(&current, coverage, total, values)) {
+        if (total < sim_effect_scan_max)
+            memcpy(out_values[total], values, sizeof values);
+        total++;
     }
-    size_t most = quick ? scan_kept : sim_effect_scan_max;
-    for (size_t i = 0; e->scan(&current, coverage, i, values); i++) {
-        double cost = quick ? quick_cost(data, from, fit, effect, values, work) : (double)i;
-        size_t place = count < most ? count++ : most;
-        while (place > 0 && costs[place - 1] > cost) {
-            place--;
-            if (place + 1 < most) {
-                costs[place + 1] = costs[place];
-                memcpy(out_values[place + 1], out_values[place], sizeof values);
-            }
-        }
-        if (place < most) {
-            costs[place] = cost;
-            memcpy(out_values[place], values, sizeof values);
-        }
+    if (total <= sim_effect_scan_max || !e->oppose)
+        return total < sim_effect_scan_max ? total : sim_effect_scan_max;
+    struct scan_point *points = calloc(total, sizeof *points);
+    if (points) {
+        for (size_t i = 0; i < total; i++)
+            e->scan(&current, coverage, i, points[i].values);
+        count = choose_valleys(data, from, fit, effect, points, total, out_values);
     }
-    free(work);
+    free(points);
     return count;
 }
 
@@ -291,6 +326,33 @@ static void drop_unneeded(const struct fit_data *data, struct hypothesis *io_h, 
     }
 }
 
+/// Looks for a better place of one named effect: its scan again, now that everything else has found its value. A
+/// ripple's first fit, beside wrong numbers, may have settled on a neighbouring frequency.
+static void place_again(const struct fit_data *data, const struct sim_coverage *coverage, int effect,
+                        struct hypothesis *io_h, struct fit *io_fit)
+{
+    struct fit base = {0}, scratch = {0};
+    struct hypothesis without = *io_h;
+    struct candidate candidate;
+    hypothesis_unname(&without, effect);
+    if (fit_init(&base, data) && fit_init(&scratch, data) && fit_run(&base, data, &without, 0) &&
+        scan_effect(&scratch, data, coverage, &without, &base, effect, &candidate) &&
+        fit_run(&scratch, data, &candidate.hypothesis, refine_iterations) && scratch.cost < io_fit->cost - 1.0) {
+        *io_h = candidate.hypothesis;
+        fit_run(io_fit, data, io_h, refine_iterations);
+    }
+    fit_free(&base);
+    fit_free(&scratch);
+}
+
+static void place_named_again(const struct fit_data *data, const struct sim_coverage *coverage, struct hypothesis *io_h,
+                              struct fit *io_fit)
+{
+    for (int e = 0; sim_effects[e]; e++)
+        if (io_h->named[e])
+            place_again(data, coverage, e, io_h, io_fit);
+}
+
 static size_t named_count(const struct hypothesis *h)
 {
     size_t count = 0;
@@ -311,6 +373,7 @@ bool search_run(const struct fit_data *data, const struct sim_coverage *coverage
         drop_unneeded(data, io_hypothesis, io_fit);
         if (!add_best(data, coverage, io_hypothesis, io_fit))
             break;
+        place_named_again(data, coverage, io_hypothesis, io_fit);
     }
     drop_unneeded(data, io_hypothesis, io_fit);
     return true;

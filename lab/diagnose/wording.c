@@ -160,7 +160,8 @@ static size_t next_of_open(const struct diagnosis *self, size_t max, char (*out_
 static const char *next_of_model(const struct diagnosis *self)
 {
     if (self->verdict == diagnosis_explained && self->cause_count > 0) {
-        return "Take over the extended model (--extended M.json writes it; servoscope simulate and measure --drive sim:M.json run it).";
+        return "Take over the extended model (--extended M.json writes it; servoscope simulate and measure --drive "
+               "sim:M.json run it).";
     }
     if (self->verdict == diagnosis_no_discrepancy && refit_matters(self)) {
         return "Take over the refitted numbers (--extended M.json writes them).";

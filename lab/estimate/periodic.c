@@ -325,6 +325,18 @@ static int transform_and_select(struct periodic *self, const struct periodic_opt
     return status;
 }
 
+static int check_output(const struct run *run, const char *output, struct error *out_error)
+{
+    const double *values = run_column(run, output);
+    for (size_t n = 1; n < run->rows; n++) {
+        if (values[n] != values[0]) {
+            return 0;
+        }
+    }
+    return error_set(out_error, error_refused, "%s: %s does not change: expected an axis that moves, see --output",
+                     run->path, output);
+}
+
 int periodic_cut(const struct run *run, const struct periodic_options *options, struct periodic *out_self,
                  struct error *out_error)
 {
@@ -336,6 +348,7 @@ int periodic_cut(const struct run *run, const struct periodic_options *options, 
         !(finite_column(run, out_self->input, out_error) && finite_column(run, out_self->output, out_error))) {
         status = error_refused;
     }
+    status = status ? status : check_output(run, out_self->output, out_error);
     status = status ? status : choose_period(out_self, options->period_samples, out_error);
     status = status ? status : count_periods(out_self, out_error);
     status = status ? status : choose_bins(out_self, options, out_error);

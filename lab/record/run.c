@@ -195,7 +195,7 @@ static int compare_doubles(const void *a, const void *b)
 /* Median of `count` steps, one less than there are time stamps; 0 if memory is short. */
 static double median_step(const double *time_s, size_t count)
 {
-    double *steps = count > 0 ? malloc(count * sizeof *steps) : NULL;
+    double *steps = count > 0 && count < SIZE_MAX / sizeof *steps ? malloc(count * sizeof *steps) : NULL;
     if (!steps)
         return 0;
     for (size_t n = 0; n < count; n++)
@@ -283,6 +283,21 @@ static int read_rate(const struct text_table *table, double rate_hz, struct run 
     return error_none;
 }
 
+/* No axis has such a value in any unit, and sums of squares of greater ones overflow far from here. */
+static int check_sizes(const struct text_table *table, const struct run *run, struct error *out_error)
+{
+    const double most = 1e30;
+    for (size_t c = 0; c < run->column_count; c++) {
+        const double *data = run->columns[c].data;
+        for (size_t n = 0; run_name_axis(run->columns[c].name) != run_axis_unknown && n < run->rows; n++)
+            if (!(data[n] >= -most && data[n] <= most))
+                return error_set(out_error, error_refused,
+                                 "%s:%zu: %s: %g is no measured value: at most %g was expected", table->path,
+                                 table->row_line[n], run->columns[c].name, data[n], most);
+    }
+    return error_none;
+}
+
 /* One column per known name, one kind of axis, 0 or 1 in `valid`. */
 static int check_columns(const struct text_table *table, struct run *run, struct error *out_error)
 {
@@ -338,6 +353,8 @@ int run_read(const char *path, const struct run_options *options, struct run *ou
     out_run->key_count = table.key_count;
     out_run->keys = table.keys;
     status = check_columns(&table, out_run, out_error);
+    if (!status)
+        status = check_sizes(&table, out_run, out_error);
     if (!status)
         status = read_keys(&table, out_run, out_error);
     if (!status)

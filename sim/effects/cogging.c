@@ -24,7 +24,7 @@ static void cogging_oppose(const double *p, const struct sim_motion *motion, str
 /// slip through, up to 110.
 static bool cogging_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
 {
-    const double fewest = 1.5, step = 0.4, most = 110.0;
+    const double fewest = 1.5, step = 0.2, most = 110.0;
     double periods = fewest + step * (double)index;
     double rate = turn * periods / coverage->position_span;
     out[0] = 0.01 * coverage->torque_rms;

@@ -57,6 +57,9 @@ refuse 2 "--rate: 'fast' is not a number" --rate fast --period 2000 "${lines[@]}
 refuse 2 "--period: '3' is out of range, expected 4 to 1048576" --rate 1000 --period 3 "${lines[@]}" "${axis[@]}" --out x
 refuse 2 "--period: '2000.5' is not a whole number" --rate 1000 --period 2000.5 "${lines[@]}" "${axis[@]}" --out x
 refuse 2 "--iterations: '0' is out of range" "${all[@]}" --iterations 0
+refuse 2 "x.csv: would be overwritten" "${all[@]}" --report x.csv
+refuse 2 "x.csv: would be overwritten" "${grid[@]}" --lines list:x.csv "${axis[@]}" --out x
+refuse 1 "nowhere/r.html: cannot be written" "${all[@]}" --report nowhere/r.html
 
 # Words
 refuse 2 "method: 'magic', expected one of fast, mca, clip" "${all[@]}" --method magic

@@ -98,4 +98,12 @@ refuse 1 'torque_Nm' nan.csv --out x.csv
 "$SERVOSCOPE" simulate --model model.json --table other.mst --periods 3 --out other.csv --quiet
 refuse 1 'run 2 has 49 lines: expected' run1.csv other.csv --out x.csv
 
+# No output takes the place of an input or of the other output; an axis that stands still has no response.
+refuse 2 'would be overwritten' run1.csv --out ./run1.csv
+refuse 2 'would be overwritten' run1.csv --out x.csv --report x.csv
+refuse 1 'nowhere/r.html: cannot be written' run1.csv --out x.csv --report nowhere/r.html
+awk -F, 'BEGIN{OFS=","} /^#/{print; next} !column{for(i=1;i<=NF;i++)if($i=="velocity_rad_per_s")column=i; print; next}
+    {$column=0.25; print}' run1.csv >still.csv
+refuse 1 'still.csv: velocity_rad_per_s does not change' still.csv --out x.csv
+
 [ "$failures" -eq 0 ]

@@ -74,16 +74,19 @@ if [ -e limited.csv ]; then
     grep -q '^# stopped_by: travel limit' limited.csv || fail "no stopped_by in the file"
 fi
 
-# Ctrl-C: a long run is cut short, kept, marked, readable.
-"$SERVOSCOPE" measure --drive sim:model.json --table table.mst --periods 5000 --settle 0 --out cut.csv >said 2>err &
-job=$!
-until grep -q '^SigCgt:.*[2367abef]$' "/proc/$job/status"; do sleep 0.02; done # it catches SIGINT: it measures
-sleep 0.1
-kill -INT "$job"
-status=0
-wait "$job" || status=$?
-[ "$status" -eq 1 ] || fail "status $status after Ctrl-C: $(cat err)"
-grep -q 'interrupted by the user' err || fail "$(cat err)"
+# Ctrl-C: a long run is cut short, kept, marked, readable. Cut while it still fades in, there is nothing to keep: then later.
+for delay in 0.1 0.4 1.6 6.4; do
+    "$SERVOSCOPE" measure --drive sim:model.json --table table.mst --periods 5000 --settle 0 --out cut.csv >said 2>err &
+    job=$!
+    until grep -q '^SigCgt:.*[2367abef]$' "/proc/$job/status"; do sleep 0.02; done # it catches SIGINT: it measures
+    sleep "$delay"
+    kill -INT "$job"
+    status=0
+    wait "$job" || status=$?
+    [ "$status" -eq 1 ] || fail "status $status after Ctrl-C: $(cat err)"
+    grep -q 'interrupted by the user' err || fail "$(cat err)"
+    [ ! -e cut.csv ] || break
+done
 grep -qx '# interrupted: true' cut.csv || fail "an interrupted run is not marked"
 [ "$(grep -vc '^#' cut.csv)" -lt 2500000 ] || fail "an interrupted run is complete"
 "$SERVOSCOPE" frf cut.csv --settle 0 --out cut-frf.csv --quiet || fail "an interrupted run cannot be read"
@@ -101,5 +104,10 @@ refuse 1 'nowhere/x.csv: cannot be written' "${all[@]}" --out nowhere/x.csv
 refuse 1 'expected at most the limit of 0.5 Nm' "${all[@]}" --limit-torque 0.5 --out x.csv
 echo '{"structure": "rigid", "mass_kg": 5, "sample_rate_hz": 1000}' >linear.json
 refuse 1 'expected one kind' --drive sim:linear.json --table table.mst --periods 3 --out x.csv
+for input in model.json ./table.mst; do
+    sum=$(cksum <"$input")
+    refuse 2 "$input: would be overwritten" "${all[@]}" --out "$input"
+    [ "$(cksum <"$input")" = "$sum" ] || fail "$input was overwritten"
+done
 
 [ "$failures" -eq 0 ]

@@ -58,16 +58,19 @@ if [ -e limited.csv ]; then
     grep -q '^# stopped_by: speed limit' limited.csv || fail "no stopped_by in the file"
 fi
 
-# Ctrl-C: a long run is cut short, kept, marked, readable.
-"$SERVOSCOPE" simulate --model model.json --table table.mst --periods 5000 --settle 0 --out cut.csv >said 2>err &
-job=$!
-until grep -q '^SigCgt:.*[2367abef]$' "/proc/$job/status"; do sleep 0.02; done # it catches SIGINT: it measures
-sleep 0.1
-kill -INT "$job"
-status=0
-wait "$job" || status=$?
-[ "$status" -eq 1 ] || fail "status $status after Ctrl-C: $(cat err)"
-grep -q 'interrupted by the user' err || fail "$(cat err)"
+# Ctrl-C: a long run is cut short, kept, marked, readable. Cut while it still fades in, there is nothing to keep: then later.
+for delay in 0.1 0.4 1.6 6.4; do
+    "$SERVOSCOPE" simulate --model model.json --table table.mst --periods 5000 --settle 0 --out cut.csv >said 2>err &
+    job=$!
+    until grep -q '^SigCgt:.*[2367abef]$' "/proc/$job/status"; do sleep 0.02; done # it catches SIGINT: it measures
+    sleep "$delay"
+    kill -INT "$job"
+    status=0
+    wait "$job" || status=$?
+    [ "$status" -eq 1 ] || fail "status $status after Ctrl-C: $(cat err)"
+    grep -q 'interrupted by the user' err || fail "$(cat err)"
+    [ ! -e cut.csv ] || break
+done
 grep -qx '# interrupted: true' cut.csv || fail "an interrupted run is not marked"
 [ "$(grep -vc '^#' cut.csv)" -lt 2500000 ] || fail "an interrupted run is complete"
 "$SERVOSCOPE" frf cut.csv --settle 0 --out cut-frf.csv --quiet || fail "an interrupted run cannot be read"
@@ -86,5 +89,10 @@ sed 's/1000/2000/' model.json >fast.json
 refuse 1 "the model's sample_rate_hz is 2000, the table's rate 1000 Hz" --model fast.json --table table.mst --periods 3 --out x.csv
 echo '{"structure": "rigid", "mass_kg": 5, "sample_rate_hz": 1000}' >linear.json
 refuse 1 'expected one kind' --model linear.json --table table.mst --periods 3 --out x.csv
+for input in model.json ./table.mst; do
+    sum=$(cksum <"$input")
+    refuse 2 "$input: would be overwritten" "${all[@]}" --out "$input"
+    [ "$(cksum <"$input")" = "$sum" ] || fail "$input was overwritten"
+done
 
 [ "$failures" -eq 0 ]

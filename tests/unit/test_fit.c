@@ -17,6 +17,7 @@ static const double two_pi = 6.283185307179586;
 
 static struct sim_model truth, given;
 static struct recording recording;
+static size_t starts[periods];
 static struct evidence evidence;
 static struct fit_data data;
 static struct fit fit;
@@ -65,8 +66,14 @@ static void record(uint64_t seed)
     for (size_t c = 0; c < 4; c++)
         for (size_t n = lead; n < rows; n++)
             block[c][(n - lead) % samples] += columns[c][n] / periods;
-    recording = (struct recording){
-        .periodic = true, .rate_hz = truth.sample_rate_hz, .periods = periods, .lead = lead, .band = 60};
+    recording = (struct recording){.periodic = true,
+                                   .rate_hz = truth.sample_rate_hz,
+                                   .periods = periods,
+                                   .lead = lead,
+                                   .starts = starts,
+                                   .band = 60};
+    for (size_t p = 0; p < periods; p++)
+        starts[p] = lead + p * samples;
     recording.block = (struct stretch){.samples = samples,
                                        .torque_ref = block[0],
                                        .torque = block[1],

@@ -25,6 +25,7 @@ static struct evidence evidence;
 static struct random generator;
 static double torque_ref[rows], torque[rows], position[rows], velocity[rows];
 static double block[4][samples];
+static size_t starts[most_periods];
 static double *whitened;
 static char message[120];
 
@@ -102,6 +103,9 @@ static void prepare(size_t periods, bool with_reference)
     recording.rate_hz = model.sample_rate_hz;
     recording.periods = periods;
     recording.lead = lead;
+    recording.starts = starts;
+    for (size_t p = 0; p < (size_t)periods; p++)
+        starts[p] = lead + p * samples;
     recording.band = band;
     recording.block = (struct stretch){.samples = samples,
                                        .torque_ref = with_reference ? block[0] : NULL,

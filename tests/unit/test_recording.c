@@ -129,6 +129,27 @@ static void test_recording_measures_what_was_covered(void)
     TEST_ASSERT_TRUE(strlen(recording.motion_from) > 20);
 }
 
+static void test_recording_leaves_out_periods_with_lost_samples(void)
+{
+    double *valid = run_add_column(&run, "valid");
+    for (size_t n = 0; n < rows; n++)
+        valid[n] = n != 2 * period + 7;
+    for (size_t n = 2 * period; n < 3 * period; n++)
+        torque[n] = 1e3; // what a lost sample leaves behind must not reach the mean
+    prepare();
+    TEST_ASSERT_EQUAL_UINT(periods - 2, recording.periods);
+    TEST_ASSERT_EQUAL_UINT(period, recording.starts[0]);
+    TEST_ASSERT_EQUAL_UINT(3 * period, recording.starts[1]);
+    TEST_ASSERT_TRUE(recording.coverage.torque_rms < 2.0);
+}
+
+static void test_recording_refuses_a_run_without_two_whole_periods(void)
+{
+    double *valid = run_add_column(&run, "valid");
+    memset(valid, 0, rows * sizeof *valid);
+    assert_refused("samples were lost");
+}
+
 static void test_recording_finds_a_period_that_the_file_does_not_say(void)
 {
     run.period_samples = 0;
@@ -209,6 +230,17 @@ static void test_recording_refuses_a_torque_that_excites_nothing(void)
     assert_refused("nothing was excited");
 }
 
+/* The file's bins say what the table had, not what reached the motor. */
+static void test_recording_refuses_a_constant_torque_whatever_bins_the_file_has(void)
+{
+    run.bins = malloc(sizeof *run.bins);
+    run.bins[0] = 3;
+    run.bin_count = 1;
+    for (size_t n = 0; n < rows; n++)
+        torque[n] = 0.1;
+    assert_refused("the torque is constant: nothing was excited");
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -216,6 +248,8 @@ int main(void)
     RUN_TEST(test_recording_block_is_the_mean_of_the_counted_periods);
     RUN_TEST(test_recording_finds_the_excited_bins_or_takes_the_files);
     RUN_TEST(test_recording_measures_what_was_covered);
+    RUN_TEST(test_recording_leaves_out_periods_with_lost_samples);
+    RUN_TEST(test_recording_refuses_a_run_without_two_whole_periods);
     RUN_TEST(test_recording_finds_a_period_that_the_file_does_not_say);
     RUN_TEST(test_recording_without_periods_is_one_block);
     RUN_TEST(test_recording_takes_the_reference_and_a_linear_axis);
@@ -224,5 +258,6 @@ int main(void)
     RUN_TEST(test_recording_refuses_a_run_of_few_rows);
     RUN_TEST(test_recording_refuses_an_axis_that_does_not_move);
     RUN_TEST(test_recording_refuses_a_torque_that_excites_nothing);
+    RUN_TEST(test_recording_refuses_a_constant_torque_whatever_bins_the_file_has);
     return UNITY_END();
 }

@@ -3,6 +3,7 @@
 #include "tools/servoscope/command.h"
 #include "tools/servoscope/designing.h"
 #include "tools/servoscope/options.h"
+#include "tools/servoscope/outputs.h"
 
 #include "lab/design/design.h"
 #include "lab/design/lines.h"
@@ -296,6 +297,34 @@ static int report(const struct arguments *arguments, const struct design_request
     return 0;
 }
 
+/// The three files of the prefix and the page, against the list of lines and against each other.
+static int check_outputs(const struct arguments *arguments, struct error *out_error)
+{
+    static const char list[] = "list:";
+    static const char *const endings[] = {".mst", ".csv", ".h"};
+    enum { endings_count = 3 };
+    const char *input =
+        strncmp(arguments->lines, list, sizeof list - 1) == 0 ? arguments->lines + sizeof list - 1 : NULL;
+    const char *outputs[endings_count + 1] = {NULL};
+    char *names[endings_count];
+    const size_t size = strlen(arguments->out) + sizeof ".mst";
+    bool memory = true;
+    for (size_t i = 0; i < endings_count; i++) {
+        outputs[i] = names[i] = malloc(size);
+        memory = memory && names[i];
+        if (names[i]) {
+            snprintf(names[i], size, "%s%s", arguments->out, endings[i]);
+        }
+    }
+    outputs[endings_count] = arguments->report;
+    int status = memory ? outputs_check(&input, 1, outputs, endings_count + 1, out_error)
+                        : error_set(out_error, error_refused, "memory is short");
+    for (size_t i = 0; i < endings_count; i++) {
+        free(names[i]);
+    }
+    return status;
+}
+
 static int design_and_write(const struct arguments *arguments, struct design_request *request,
                             const struct command_context *context, struct error *out_error)
 {
@@ -332,6 +361,7 @@ static int run(int argc, char **argv, const struct command_context *context, str
     status = status ? status : read_rate(arguments.rate, &request, out_error);
     status = status ? status : read_choices(&arguments, &request, out_error);
     status = status ? status : resolve_axis(&arguments, &request, out_error);
+    status = status ? status : check_outputs(&arguments, out_error);
     if (status) {
         return status;
     }

@@ -7,16 +7,14 @@
 #include "lab/record/run.h"
 #include "tools/servoscope/command.h"
 #include "tools/servoscope/options.h"
+#include "tools/servoscope/outputs.h"
 
-#include <errno.h>
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <time.h>
-#include <unistd.h>
 
 enum { outputs_max = 3, sentences_max = 8 };
 
@@ -75,62 +73,19 @@ static size_t list_outputs(const struct arguments *arguments, const char *out_pa
     return count;
 }
 
-/// Whether two names lead to one ordinary file.
-static bool same_file(const char *one, const char *other)
-{
-    struct stat a, b;
-    if (strcmp(one, other) == 0) {
-        return strncmp(one, "/dev/", 5) != 0;
-    }
-    return stat(one, &a) == 0 && stat(other, &b) == 0 && S_ISREG(a.st_mode) && a.st_dev == b.st_dev &&
-           a.st_ino == b.st_ino;
-}
-
-/// A result must not be lost to a folder that was never there.
-static int check_folder(const char *path, struct error *out_error)
-{
-    const char *slash = strrchr(path, '/');
-    size_t length = slash ? (size_t)(slash - path) : 0;
-    char *folder = malloc(length + 2);
-    if (!folder) {
-        return error_set(out_error, error_refused, "memory is short");
-    }
-    memcpy(folder, path, length);
-    strcpy(folder + length, slash ? "/" : ".");
-    int status = 0;
-    if (access(folder, W_OK) != 0) {
-        status = error_set(out_error, error_refused, "%s: cannot be written: %s: %s", path, folder, strerror(errno));
-    }
-    free(folder);
-    return status;
-}
-
 /// No output may take the place of an input or of another output, and every folder has to be there.
 static int check_outputs(const struct arguments *arguments, struct error *out_error)
 {
-    const char *outputs[outputs_max];
-    size_t count = list_outputs(arguments, outputs);
-    for (size_t i = 0; i < count; i++) {
-        bool taken = arguments->model && same_file(outputs[i], arguments->model);
-        for (size_t r = 0; r < arguments->runs.count; r++) {
-            taken = taken || same_file(outputs[i], arguments->runs.items[r]);
-        }
-        for (size_t r = 0; r < arguments->validate.count; r++) {
-            taken = taken || same_file(outputs[i], arguments->validate.items[r]);
-        }
-        for (size_t other = 0; other < i; other++) {
-            taken = taken || same_file(outputs[i], outputs[other]);
-        }
-        if (taken) {
-            return error_set(out_error, error_usage, "%s: would be overwritten: name another file for the result",
-                             outputs[i]);
-        }
-        int status = check_folder(outputs[i], out_error);
-        if (status) {
-            return status;
-        }
+    const char *inputs[2 * option_values_max + 1], *outputs[outputs_max];
+    size_t count = 0;
+    for (size_t i = 0; i < arguments->runs.count; i++) {
+        inputs[count++] = arguments->runs.items[i];
     }
-    return 0;
+    for (size_t i = 0; i < arguments->validate.count; i++) {
+        inputs[count++] = arguments->validate.items[i];
+    }
+    inputs[count++] = arguments->model;
+    return outputs_check(inputs, count, outputs, list_outputs(arguments, outputs), out_error);
 }
 
 static void free_inputs(struct inputs *self)

@@ -12,6 +12,7 @@
 #include "lab/record/run.h"
 #include "tools/servoscope/command.h"
 #include "tools/servoscope/options.h"
+#include "tools/servoscope/outputs.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -346,6 +347,8 @@ static int run(int argc, char **argv, const struct command_context *context, str
     const struct estimate_method *method = NULL;
     int status = read_options(argc, argv, &arguments, out_error);
     status = status ? status : read_request(&arguments, &options, &method, out_error);
+    const char *outputs[] = {arguments.out, arguments.report};
+    status = status ? status : outputs_check(arguments.runs.items, arguments.runs.count, outputs, 2, out_error);
     if (status) {
         return status;
     }

@@ -30,13 +30,20 @@ static int read_options(int argc, char **argv, struct arguments *out, struct err
     return 0;
 }
 
+/// The file behind sim:FILE, or NULL.
+static const char *model_path(const char *url)
+{
+    static const char simulator[] = "sim:";
+    const char *path = url + sizeof simulator - 1;
+    return strncmp(url, simulator, sizeof simulator - 1) == 0 && *path != '\0' ? path : NULL;
+}
+
 /// A simulated drive is of one kind of axis; the table has to be of the same.
 static int check_axis(const struct arguments *arguments, const struct measuring *measuring, struct error *out_error)
 {
-    static const char simulator[] = "sim:";
     struct sim_model model;
-    const char *path = arguments->drive + sizeof simulator - 1;
-    if (strncmp(arguments->drive, simulator, sizeof simulator - 1) != 0 || *path == '\0') {
+    const char *path = model_path(arguments->drive);
+    if (!path) {
         return 0;
     }
     int status = model_file_read(path, &model, out_error);
@@ -56,6 +63,7 @@ static int run(int argc, char **argv, const struct command_context *context, str
     struct door door;
     measuring_defaults(&arguments.measuring);
     int status = read_options(argc, argv, &arguments, out_error);
+    arguments.measuring.drive_file = status ? NULL : model_path(arguments.drive);
     status = status ? status : measuring_prepare(&arguments.measuring, &measuring, out_error);
     if (status) {
         return status;

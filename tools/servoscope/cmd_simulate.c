@@ -59,6 +59,7 @@ static int run(int argc, char **argv, const struct command_context *context, str
     measuring_defaults(&arguments.measuring);
     int status = read_options(argc, argv, &arguments, out_error);
     status = status ? status : model_file_read(arguments.model, &model, out_error);
+    arguments.measuring.drive_file = arguments.model;
     if (status) {
         return status;
     }

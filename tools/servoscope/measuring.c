@@ -2,14 +2,13 @@
 #include "tools/servoscope/measuring.h"
 
 #include "lab/record/json_out.h"
+#include "tools/servoscope/outputs.h"
 
-#include <errno.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include <unistd.h>
 
 /* The only way from a signal handler to the loop. */
 static volatile sig_atomic_t stop_requested;
@@ -108,25 +107,6 @@ size_t measuring_options(struct measuring_request *request, struct option *out_o
     return sizeof options / sizeof options[0];
 }
 
-/// A measurement must not be lost to a folder that was never there.
-static int check_folder(const char *path, struct error *out_error)
-{
-    const char *slash = strrchr(path, '/');
-    size_t length = slash ? (size_t)(slash - path) : 0;
-    char *folder = malloc(length + 2);
-    if (!folder) {
-        return error_set(out_error, error_refused, "memory is short");
-    }
-    memcpy(folder, path, length);
-    strcpy(folder + length, slash ? "/" : ".");
-    int status = 0;
-    if (access(folder, W_OK) != 0) {
-        status = error_set(out_error, error_refused, "%s: cannot be written: %s: %s", path, folder, strerror(errno));
-    }
-    free(folder);
-    return status;
-}
-
 static int read_mode(const char *text, enum drive_mode *out_mode, struct error *out_error)
 {
     *out_mode = drive_mode_cascade;
@@ -159,7 +139,8 @@ int measuring_prepare(const struct measuring_request *request, struct measuring 
     *out_self = (struct measuring){.request = request};
     struct measure_plan *plan = &out_self->plan;
     int status = read_mode(request->mode, &plan->mode, out_error);
-    status = status ? status : check_folder(request->out, out_error);
+    const char *inputs[] = {request->table, request->drive_file};
+    status = status ? status : outputs_check(inputs, 2, &request->out, 1, out_error);
     status = status ? status : table_bytes_read(request->table, &out_self->table, out_error);
     if (status) {
         return status;

@@ -18,6 +18,7 @@ enum { measuring_options_max = 16 };
 struct measuring_request {
     const char *table;
     const char *out;
+    const char *drive_file; ///< the model file that is the drive, not to be overwritten; NULL: there is none
     const char *mode;
     long long periods;
     long long settle;
