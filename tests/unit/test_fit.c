@@ -17,7 +17,7 @@ static const double two_pi = 6.283185307179586;
 
 static struct sim_model truth, given;
 static struct recording recording;
-static size_t starts[periods];
+static size_t period_starts[periods];
 static struct evidence evidence;
 static struct fit_data data;
 static struct fit fit;
@@ -70,10 +70,10 @@ static void record(uint64_t seed)
                                    .rate_hz = truth.sample_rate_hz,
                                    .periods = periods,
                                    .lead = lead,
-                                   .starts = starts,
+                                   .starts = period_starts,
                                    .band = 60};
     for (size_t p = 0; p < periods; p++)
-        starts[p] = lead + p * samples;
+        period_starts[p] = lead + p * samples;
     recording.block = (struct stretch){.samples = samples,
                                        .torque_ref = block[0],
                                        .torque = block[1],

@@ -123,7 +123,8 @@ static void test_run_read_names_file_line_column_and_value_of_a_bad_number(void)
     refuse("time_s,torque_Nm\n0,0x10\n", "run.csv:2: torque_Nm: '0x10' is hexadecimal, a decimal number was expected");
     refuse("time_s,torque_Nm\n0,\"1,5\"\n", "run.csv:2: torque_Nm: '1,5' has a decimal comma, a point was expected");
     refuse("time_s,torque_Nm\n0,1e400\n", "run.csv:2: torque_Nm: '1e400' is too large for a double");
-    refuse("time_s,torque_Nm\n0,1\n1,-1e308\n", "run.csv:3: torque_Nm: -1e+308 is no measured value: at most 1e+30 was expected");
+    refuse("time_s,torque_Nm\n0,1\n1,-1e308\n",
+           "run.csv:3: torque_Nm: -1e+308 is no measured value: at most 1e+30 was expected");
     refuse("time_s,torque_2_Nm\n0,\n", "run.csv:2: torque_2_Nm: '' is empty, a number was expected");
     refuse("time_s,torque_Nm\n0,1.5.2\n", "run.csv:2: torque_Nm: '1.5.2' is not a number");
     refuse("time_s,valid\n0,1\n1,2\n", "run.csv:3: valid: 2: 0 or 1 was expected");
