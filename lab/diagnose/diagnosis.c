@@ -336,7 +336,11 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     d->extended = validate_figures(&w->validate_data, &d->extended_model);
     d->noise_floor_nrmse = validate_noise_floor(&w->validate_data, &d->extended_model);
     struct judgement judgement;
-    if (!judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, d->extended.whitened_rms, &judgement))
+    // An effect that cannot show in the validation data changes nothing there; one that spoils it is a wrong name.
+    const double clearly = 1.2;
+    bool worse = d->extended.validation_nrmse > clearly * d->refitted.validation_nrmse &&
+                 d->extended.validation_nrmse > clearly * d->noise_floor_nrmse;
+    if (!judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, d->extended.whitened_rms, worse, &judgement))
         return false;
     d->verdict = judgement.unexplained ? diagnosis_unexplained
                  : judgement.count > 0 ? diagnosis_explained

@@ -136,7 +136,7 @@ static enum blackbox_group one_gap(const struct blackbox *box, const struct fit_
 }
 
 bool judge(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,
-           const struct fit *fit, double validation_rms, struct judgement *out_judgement)
+           const struct fit *fit, double validation_rms, bool worse, struct judgement *out_judgement)
 {
     struct judgement *j = out_judgement;
     struct blackbox box;
@@ -148,7 +148,9 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
     double scale = fmax(left / (double)data->values, 1.0);
     double chance = 0.5 * (double)box.columns + 12.0 * sqrt(0.5 * (double)box.columns);
     const double half_again = 1.5, visible = 1.12; // a third of the noise, in amplitude
-    j->unexplained = (j->leftover / scale > chance && fit->cost > visible * left) ||
+    const double seen_again = 1.03;                // on data the fit has not seen: chance does not come twice
+    j->unexplained = worse ||
+                     (j->leftover / scale > chance && fit->cost > visible * left && !(validation_rms < seen_again)) ||
                      fit->cost / (double)data->values > half_again * half_again || !(validation_rms < half_again);
     enum blackbox_group gap = hypothesis->inertia_free ? blackbox_groups : one_gap(&box, data, hypothesis, fit);
     if (gap != blackbox_groups && !j->unexplained) {
@@ -158,7 +160,8 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
                  blackbox_group_name(gap));
     } else if (j->unexplained)
         describe_rest(&box, data, hypothesis, fit, j->where, sizeof j->where);
-    judge_names(&box, data, coverage, hypothesis, fit, j);
+    if (!worse)
+        judge_names(&box, data, coverage, hypothesis, fit, j);
     blackbox_free(&box);
     return true;
 }

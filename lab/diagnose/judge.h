@@ -15,7 +15,8 @@ struct judgement {
     char where[300]; ///< what is left, in words
 };
 
-/// Judges a finished search. `validation_rms` is the whitened RMS of the extended model on the validation data.
+/// Judges a finished search. `validation_rms` is the whitened RMS of the extended model on the validation data; `worse`
+/// says that the extended model errs more there than the refitted one.
 /// Unexplained: the black box gains more than chance allows (its expected gain plus twelve standard deviations) and
 ///              more than a
 /// third of the noise in amplitude, or one group of it does as well as three names, or the residual on fit or
@@ -23,7 +24,7 @@ struct judgement {
 /// where something stays unexplained, far more than what stays and more than the black box can do without it.
 /// Errors: false if memory is short.
 bool judge(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,
-           const struct fit *fit, double validation_rms, struct judgement *out_judgement);
+           const struct fit *fit, double validation_rms, bool worse, struct judgement *out_judgement);
 
 /// Named effects that another effect could replace within 6 nats. Returns how many were written.
 size_t judge_ties(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,

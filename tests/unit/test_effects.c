@@ -32,7 +32,7 @@ static const char *const known_ids[] = {"inertia",
                                         "friction_drift",
                                         "lost_samples"};
 
-static char message[200];
+static char message[400];
 
 void setUp(void) {}
 

@@ -331,7 +331,7 @@ static void print_end(const struct demo *self)
     hiding_describe(&self->hiding, sizeof text, text);
     printf("\nhidden: %s\n", text);
     for (size_t i = 0; i < d->cause_count; i++) {
-        printf("%s  %s: %s\n", i == 0 ? "found: " : "       ", sim_effects[d->causes[i].effect]->id, d->causes[i].says);
+        printf("%s %s: %s\n", i == 0 ? "found: " : "       ", sim_effects[d->causes[i].effect]->id, d->causes[i].says);
     }
     if (d->cause_count == 0) {
         wording_headline(d, text);
