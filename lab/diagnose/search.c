@@ -169,32 +169,34 @@ static size_t choose_scan(const struct fit_data *data, const struct sim_coverage
     return count;
 }
 
-/// Where the structure changes, derivatives of the old one are worth nothing: the scan values with the lowest cost as
-/// they are get a short fit of their own.
+static int by_cost(const void *a, const void *b)
+{
+    double x = ((const struct candidate *)a)->cost, y = ((const struct candidate *)b)->cost;
+    return (x > y) - (x < y);
+}
+
+/// Where the structure changes, derivatives of the old one are worth nothing: every scan value gets one step of its own, the
+/// lowest few a short fit.
 static void scan_restructured(struct fit *scratch, const struct fit_data *data, const struct hypothesis *from,
                               int effect, double values[][sim_effect_parameters_max], size_t count,
                               struct candidate *out)
 {
     enum { tried = 4 };
-    double costs[sim_effect_scan_max];
+    struct candidate *list = calloc(count, sizeof *list);
+    if (!list)
+        return;
     for (size_t i = 0; i < count; i++) {
-        struct hypothesis trial = *from;
-        hypothesis_name(&trial, effect, values[i]);
-        costs[i] = fit_cost(scratch, data, &trial, trial.x);
+        list[i].hypothesis = *from;
+        hypothesis_name(&list[i].hypothesis, effect, values[i]);
+        list[i].cost = fit_roughly(scratch, data, &list[i].hypothesis, 1) ? scratch->cost : INFINITY;
     }
-    for (size_t round = 0; round < tried && round < count; round++) {
-        size_t best = 0;
-        for (size_t i = 1; i < count; i++)
-            if (costs[i] < costs[best])
-                best = i;
-        costs[best] = INFINITY;
-        struct hypothesis trial = *from;
-        hypothesis_name(&trial, effect, values[best]);
-        if (fit_roughly(scratch, data, &trial, scan_iterations) && scratch->cost < out->cost) {
+    qsort(list, count, sizeof *list, by_cost);
+    for (size_t i = 0; i < tried && i < count; i++)
+        if (fit_roughly(scratch, data, &list[i].hypothesis, scan_iterations) && scratch->cost < out->cost) {
             out->cost = scratch->cost;
-            out->hypothesis = trial;
+            out->hypothesis = list[i].hypothesis;
         }
-    }
+    free(list);
 }
 
 /// Tries one effect from its scan values with one step each; keeps the best.
@@ -218,12 +220,6 @@ static bool scan_effect(struct fit *scratch, const struct fit_data *data, const 
         }
     }
     return isfinite(out->cost);
-}
-
-static int by_cost(const void *a, const void *b)
-{
-    double x = ((const struct candidate *)a)->cost, y = ((const struct candidate *)b)->cost;
-    return (x > y) - (x < y);
 }
 
 /// Scaled gain in nats of a candidate over the current fit.
