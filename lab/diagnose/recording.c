@@ -72,10 +72,12 @@ static int take_columns(const struct run *run, struct recording *r, struct error
     return 0;
 }
 
-/// The run's own word, else what its torque repeats after; only a repetition as good as a multisine's is believed.
+/// The run's own word, else what its torque repeats after; only repetitions as good and as many as a multisine's are
+/// believed.
 static size_t find_period(const struct run *run)
 {
     const double nearly_exact = 0.99;
+    const size_t fewest = 5; // fewer leave nothing to average, and a start to throw away
     const double *reference = either(run, "torque_ref_Nm", "force_ref_N");
     const double *torque = either(run, "torque_Nm", "force_N");
     struct period_search search;
@@ -83,7 +85,8 @@ static size_t find_period(const struct run *run)
         return run->period_samples;
     if (!torque || period_search_run(reference ? reference : torque, run->rows, &search) != period_search_ok)
         return 0;
-    return search.correlation >= nearly_exact ? search.period_samples : 0;
+    bool often = run->rows >= fewest * search.period_samples;
+    return often && search.correlation >= nearly_exact ? search.period_samples : 0;
 }
 
 /// Periods that count: after the settling ones and, unless the file says how many settled, after the first.

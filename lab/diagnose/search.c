@@ -175,8 +175,8 @@ static int by_cost(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/// Where the structure changes, derivatives of the old one are worth nothing: every scan value gets one step of its own, the
-/// lowest few a short fit.
+/// Where the structure changes, derivatives of the old one are worth nothing: every scan value gets one step of its
+/// own, the lowest few a short fit.
 static void scan_restructured(struct fit *scratch, const struct fit_data *data, const struct hypothesis *from,
                               int effect, double values[][sim_effect_parameters_max], size_t count,
                               struct candidate *out)
