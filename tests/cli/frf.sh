@@ -1,28 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # servoscope frf from the command line: the response it writes, several runs, what it refuses.
-set -euo pipefail
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-cd "$folder"
-failures=0
-
-fail() {
-    echo "FAILED: $*" >&2
-    failures=$((failures + 1))
-}
-
-# refuse STATUS PART ARGUMENTS...   the program ends with STATUS, says PART in one line on standard error, writes no x.csv
-refuse() {
-    local expected=$1 part=$2 status=0
-    shift 2
-    "$SERVOSCOPE" frf "$@" >out 2>err || status=$?
-    [ "$status" -eq "$expected" ] || fail "status $status instead of $expected: $*"
-    grep -qF -- "$part" err || fail "no '$part' in '$(cat err)': $*"
-    [ "$(wc -l <err)" -eq 1 ] || fail "not one line: $(cat err)"
-    [ ! -s out ] || fail "standard output is not empty: $*"
-    [ ! -e x.csv ] || fail "left behind x.csv: $*"
-}
+subcommand=frf
+source "$SERVOSCOPE_SOURCE/tests/support/cli.sh"
 
 echo '{"structure": "rigid", "motor_inertia_kgm2": 0.005, "sample_rate_hz": 1000, "seed": 3}' >model.json
 for seed in 1 2 3; do

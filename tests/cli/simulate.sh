@@ -1,28 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # servoscope simulate from the command line: the run it writes, Ctrl-C, what it refuses and what is left on the disk then.
-set -euo pipefail
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-cd "$folder"
-failures=0
-
-fail() {
-    echo "FAILED: $*" >&2
-    failures=$((failures + 1))
-}
-
-# refuse STATUS PART ARGUMENTS...   the program ends with STATUS, says PART in one line on standard error, writes no x.csv
-refuse() {
-    local expected=$1 part=$2 status=0
-    shift 2
-    "$SERVOSCOPE" simulate "$@" >out 2>err || status=$?
-    [ "$status" -eq "$expected" ] || fail "status $status instead of $expected: $*"
-    grep -qF -- "$part" err || fail "no '$part' in '$(cat err)': $*"
-    [ "$(wc -l <err)" -eq 1 ] || fail "not one line: $(cat err)"
-    [ ! -s out ] || fail "standard output is not empty: $*"
-    [ ! -e x.csv ] || fail "left behind x.csv: $*"
-}
+subcommand=simulate
+source "$SERVOSCOPE_SOURCE/tests/support/cli.sh"
 
 "$SERVOSCOPE" design --rate 1000 --period 500 --lines linear:2:100:2 --limit-torque 1 --inertia 0.005 --method newman \
     --out table --quiet
