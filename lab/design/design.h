@@ -9,9 +9,12 @@
 
 #include "lab/record/error.h"
 
+#include <signal.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+
+struct sim_model;
 
 enum {
     design_period_samples_max = 1 << 20,
@@ -33,6 +36,8 @@ enum design_keep {
 enum design_start {
     design_start_paper, ///< the velocity's zero crossing with the least acceleration (first paper, 3.3)
     design_start_none,  ///< sample 0 of equation (1)
+    design_start_bank,  ///< least expected transient over a bank of nominal two-mass drives (start_phase.h)
+    design_start_model, ///< least transient of the drive that request.start_model describes
 };
 
 /// Largest absolute values; 0: does not limit.
@@ -52,13 +57,27 @@ struct design_request {
     struct design_limits limits;
     double inertia_kgm2; ///< > 0: torque is inertia times acceleration
     bool linear;
+    /// Torque amplitudes of the lines relative to each other (bin_count numbers > 0); NULL: by the limits (spectrum.h).
+    const double *torque_shape;
+    /// > 0, for "fast": each amplitude may differ from the prescribed ratio by this much, up or down.
+    double amplitude_tolerance_db;
     const char *method;    ///< a name from design_methods[]; NULL: "fast"
     enum design_keep keep; ///< for "clip"
     enum design_grid grid;
     enum design_start start;
-    size_t iterations; ///< 0: the method's own
-    size_t starts;     ///< of "fast": 0 or 1 is the deterministic start alone, more add seeded ones
+    size_t iterations;                   ///< 0: the method's own
+    const struct sim_model *start_model; ///< with design_start_model
+    bool torque_mode;                    ///< the table will drive the torque alone (open loop), not the cascade
+    size_t starts;        ///< of "fast": 1 is the deterministic start alone, more add seeded ones; 0: its own
+    double time_budget_s; ///< > 0, of "fast": further seeded starts until so much wall-clock time has gone
+    size_t threads;       ///< 0: as many as there are processors
     uint64_t seed;
+    /// Set to non-zero from a signal handler or another thread: the best so far is the result. NULL: nobody asks.
+    const volatile sig_atomic_t *stop_requested;
+    /// Called now and then from the thread that called design_run(): share of the work done, 0 .. 1, and the best
+    /// effective torque so far on the grid of the search. NULL: nobody looks.
+    void (*progress)(void *context, double share_done, double effective_torque_Nm);
+    void *progress_context;
 };
 
 struct design_peaks {
@@ -86,8 +105,10 @@ struct design_result {
     double effective_torque_Nm;
     double effective_torque_continuous_Nm; ///< the same scaled down until the limits hold between the samples too
     double crest_factor;                   ///< torque peak (where the grid asks for it) over effective torque
-    double bound_Nm; ///< no phases give more at these amplitude ratios on this grid (docs/theory.md)
-    double cpu_s;    ///< processor time of the optimiser
+    double bound_Nm;  ///< no phases give more at these amplitude ratios on this grid (docs/theory.md)
+    double cpu_s;     ///< processor time of the optimiser, all threads added
+    size_t starts;    ///< of "fast": how many were finished
+    bool interrupted; ///< stop_requested was seen before the method was through
 };
 
 struct design_search;

@@ -30,8 +30,10 @@ bool design_spectrum_create(const struct design_request *request, struct design_
         double omega = two_pi * line_hz * request->bins[k];
         spectrum.omega_rad_per_s[k] = omega;
         spectrum.amplitude_rad[k] =
-            fmin(spectrum.limit[design_position],
-                 fmin(spectrum.limit[design_velocity] / omega, spectrum.limit[design_acceleration] / (omega * omega)));
+            request->torque_shape
+                ? request->torque_shape[k] / (request->inertia_kgm2 * omega * omega)
+                : fmin(spectrum.limit[design_position], fmin(spectrum.limit[design_velocity] / omega,
+                                                             spectrum.limit[design_acceleration] / (omega * omega)));
     }
     *out_spectrum = spectrum;
     return true;

@@ -17,11 +17,11 @@ struct design_spectrum {
     size_t line_count;
     const uint32_t *bins; ///< the request's
     double *omega_rad_per_s;
-    double *amplitude_rad;             ///< A_k: each line alone just reaches its tightest limit
+    double *amplitude_rad;             ///< A_k; by the limits: each line alone just reaches its tightest one
     double limit[design_signal_count]; ///< INFINITY if free; acceleration: the tighter of its own and torque / inertia
 };
 
-/// A_k = min(q_max, v_max / w_k, a_max / w_k^2)     (first paper, 3.4).
+/// A_k = min(q_max, v_max / w_k, a_max / w_k^2)     (first paper, 3.4), or by request->torque_shape.
 /// Returns false if memory is short.
 bool design_spectrum_create(const struct design_request *request, struct design_spectrum *out_spectrum);
 void design_spectrum_free(struct design_spectrum *spectrum);
