@@ -6,15 +6,14 @@
 #include "lab/record/model_file.h"
 #include "lab/record/run.h"
 #include "tools/servoscope/command.h"
+#include "tools/servoscope/interrupt.h"
 #include "tools/servoscope/options.h"
 #include "tools/servoscope/outputs.h"
 
 #include <math.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 enum { outputs_max = 3, sentences_max = 8 };
 
@@ -35,15 +34,6 @@ struct inputs {
     struct run *runs; ///< count of them, those to fit first
     struct sim_model model;
 };
-
-/* The only way from a signal handler to the search. */
-static volatile sig_atomic_t stop_requested;
-
-static void request_stop(int signal_number)
-{
-    (void)signal_number;
-    stop_requested = 1;
-}
 
 static int read_options(int argc, char **argv, struct arguments *out, struct error *out_error)
 {
@@ -141,37 +131,22 @@ static int read_inputs(const struct arguments *arguments, struct inputs *out, st
 
 // ---- Progress
 
-struct progress {
-    bool wanted;
-    bool shown;
-    double started_s, shown_s;
-};
-
-static double now_s(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-/// One line on the terminal, five times a second, from the second second on; false once Ctrl-C was pressed.
+/// One line on the terminal; false once Ctrl-C was pressed.
 static bool show_progress(void *user, const char *what)
 {
-    struct progress *self = user;
-    double now = now_s();
-    if (self->wanted && now - self->started_s > 1.0 && now - self->shown_s > 0.2) {
-        fprintf(stderr, "\r\033[K%3.0f s  %.60s", now - self->started_s, what);
-        self->shown_s = now;
-        self->shown = true;
+    struct terminal_line *line = user;
+    if (terminal_line_due(line)) {
+        fprintf(stderr, "\r\033[K%3.0f s  %.60s", terminal_line_elapsed_s(line), what);
     }
-    return !stop_requested;
+    return !*interrupt_flag();
 }
 
 /// Runs the diagnosis; the first Ctrl-C ends the search with the best so far, the second one the program.
 static int diagnose(const struct inputs *inputs, const struct arguments *arguments,
                     const struct command_context *context, struct diagnosis *out_diagnosis, struct error *out_error)
 {
-    struct progress progress = {.wanted = context->terminal && !context->quiet && !context->json, .started_s = now_s()};
+    struct terminal_line line;
+    terminal_line_start(&line, context);
     const struct diagnosis_request request = {
         .fit = inputs->runs,
         .fit_count = inputs->fit_count,
@@ -179,20 +154,13 @@ static int diagnose(const struct inputs *inputs, const struct arguments *argumen
         .validate_count = inputs->count - inputs->fit_count,
         .model = arguments->model ? &inputs->model : NULL,
         .progress = show_progress,
-        .user = &progress,
+        .user = &line,
     };
-    struct sigaction action, before;
-    memset(&action, 0, sizeof action);
-    action.sa_handler = request_stop;
-    action.sa_flags = (int)SA_RESETHAND;
-    sigemptyset(&action.sa_mask);
-    stop_requested = 0;
-    sigaction(SIGINT, &action, &before);
+    struct interrupt signals;
+    interrupt_catch(&signals, true);
     int status = diagnosis_run(&request, out_diagnosis, out_error);
-    sigaction(SIGINT, &before, NULL);
-    if (progress.shown) {
-        fputs("\r\033[K", stderr);
-    }
+    interrupt_release(&signals);
+    terminal_line_clear(&line);
     return status;
 }
 
@@ -323,7 +291,7 @@ static int run(int argc, char **argv, const struct command_context *context, str
         status = deliver(diagnosis, &arguments, context, out_error);
         diagnosis_free(diagnosis);
     }
-    if (!status && stop_requested) {
+    if (!status && *interrupt_flag()) {
         status = error_set(out_error, error_refused,
                            "interrupted: what was found until then is the best so far, the "
                            "search was not finished");
