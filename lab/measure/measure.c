@@ -2,6 +2,7 @@
 #include "lab/measure/measure.h"
 
 #include "core/bytes.h"
+#include "core/fixed.h"
 #include "lab/measure/recorder.h"
 #include "msgen/player.h"
 
@@ -10,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+const double measure_dwell_s = 1.0;
 static const double shortest_ramp_s = 0.05;
 static const double longest_ramp_s = 10.0;
 enum { default_lost_in_a_row = 20 };
@@ -46,6 +48,26 @@ static double peak_of(const struct msgen_table *table, uint32_t channel)
     return peak;
 }
 
+/// What the position gains in each period, rad or m.
+static double travel_of(const struct msgen_table *table)
+{
+    return table->travel_q30 ? (double)table->travel_q30 / CORE_Q30_ONE * scale_of(table, msgen_channel_position) : 0.0;
+}
+
+/// Shortest ramp to the table's mean speed that its own top acceleration would do.
+static double travel_ramp_s(const struct msgen_table *table)
+{
+    double step = 0.0;
+    for (uint32_t n = 0; n < table->period_samples; n++) {
+        uint32_t next = n + 1 < table->period_samples ? n + 1 : 0;
+        step = fmax(step, fabs(table_value(table, next, msgen_channel_velocity) -
+                               table_value(table, n, msgen_channel_velocity)));
+    }
+    double acceleration = step * rate_hz(table);
+    double speed = fabs(travel_of(table)) * rate_hz(table) / (double)table->period_samples;
+    return acceleration > 0.0 ? 1.5 * speed / acceleration : 0.0;
+}
+
 uint32_t measure_ramp_samples(const struct msgen_table *table, enum drive_mode mode)
 {
     double ramp_s = shortest_ramp_s;
@@ -53,6 +75,7 @@ uint32_t measure_ramp_samples(const struct msgen_table *table, enum drive_mode m
         double velocity = peak_of(table, msgen_channel_velocity);
         double position = peak_of(table, msgen_channel_position);
         ramp_s = velocity > 0.0 ? fmax(ramp_s, 1.5 * position / velocity) : ramp_s;
+        ramp_s = table->travel_q30 ? fmax(ramp_s, travel_ramp_s(table)) : ramp_s;
     }
     return (uint32_t)ceil(fmin(ramp_s, longest_ramp_s) * rate_hz(table));
 }
@@ -62,6 +85,97 @@ static uint32_t ramp_or_default(const struct measure_plan *plan, uint32_t wanted
 {
     uint32_t samples = wanted ? wanted : measure_ramp_samples(plan->table, plan->mode);
     return samples < msgen_ramp_samples_max ? samples : msgen_ramp_samples_max;
+}
+
+static uint32_t dwell_samples(const struct msgen_table *table)
+{
+    return (uint32_t)fmin(ceil(measure_dwell_s * rate_hz(table)), msgen_ramp_samples_max);
+}
+
+static struct msgen_player_config player_config(const struct measure_plan *plan)
+{
+    const uint32_t fade = ramp_or_default(plan, plan->fade_samples);
+    const bool approach = plan->without_fade_in && plan->mode == drive_mode_cascade;
+    return (struct msgen_player_config){
+        .periods = plan->settle_periods + plan->periods,
+        .fade_in_samples = plan->without_fade_in ? 0 : fade,
+        .approach_samples = approach ? fade : 0,
+        .dwell_samples = approach ? dwell_samples(plan->table) : 0,
+        .fade_out_samples = fade,
+        .abort_samples = ramp_or_default(plan, plan->abort_samples),
+    };
+}
+
+/// What is played beside the periods of a complete run.
+static size_t lead_and_fade_out(const struct msgen_player_config *config)
+{
+    return (size_t)config->fade_in_samples + config->approach_samples + config->dwell_samples +
+           config->fade_out_samples;
+}
+
+struct range {
+    double low, high;
+};
+
+static struct range position_range(const struct msgen_table *table)
+{
+    struct range range = {0.0, 0.0}; // where the axis stands before and after
+    for (uint32_t n = 0; n < table->period_samples; n++) {
+        double position = table_value(table, n, msgen_channel_position);
+        range.low = fmin(range.low, position);
+        range.high = fmax(range.high, position);
+    }
+    return range;
+}
+
+/// Where a travelling position gets to: the table's own range, moved by the travel of all periods, of a dwell and of
+/// both ramps, which count half each.
+static int check_travel_range(const struct measure_plan *plan, struct error *out_error)
+{
+    const struct msgen_table *table = plan->table;
+    const struct guard_real_limits *limits = &plan->limits;
+    const char *unit = table->linear ? "m" : "rad";
+    double travel = travel_of(table);
+    const struct msgen_player_config config = player_config(plan);
+    double ramps = 0.5 * (double)(lead_and_fade_out(&config) + config.dwell_samples) / (double)table->period_samples;
+    double periods = (double)plan->settle_periods + (double)plan->periods;
+    struct range range = position_range(table);
+    double room = travel > 0.0 ? limits->position_max_rad - range.high : range.low - limits->position_min_rad;
+    double accepted = fmax(0.0, floor(room / fabs(travel) - ramps));
+    double counts = (periods + ramps) * fabs(travel) + fmax(range.high, -range.low);
+    double counts_max = (double)INT32_MAX * scale_of(table, msgen_channel_position);
+    range.low += fmin(0.0, travel * (periods + ramps));
+    range.high += fmax(0.0, travel * (periods + ramps));
+    if (!(range.low >= limits->position_min_rad && range.high <= limits->position_max_rad)) {
+        return error_set(out_error, error_refused,
+                         "the table travels %.6g %s in each period, and %.0f periods with their ramps need positions "
+                         "from %.6g to %.6g %s: expected within %.6g..%.6g, which has room for %.0f periods, settling "
+                         "ones included",
+                         travel, unit, periods, range.low, range.high, unit, (double)limits->position_min_rad,
+                         (double)limits->position_max_rad, accepted);
+    }
+    if (table->format != msgen_format_f32 && !(counts <= counts_max)) {
+        return error_set(out_error, error_refused,
+                         "%.0f periods travel %.6g %s: expected at most %.6g %s, which the table's counts hold",
+                         periods, counts, unit, counts_max, unit);
+    }
+    return 0;
+}
+
+static int check_travel(const struct measure_plan *plan, struct error *out_error)
+{
+    const struct msgen_table *table = plan->table;
+    if (table->travel_q30 == 0) {
+        return 0;
+    }
+    if (plan->mode == drive_mode_torque) {
+        return error_set(out_error, error_refused,
+                         "the table moves at a constant speed of %.6g %s under its multisine, which torque mode cannot "
+                         "hold: expected --mode cascade, or a table without bias velocity",
+                         travel_of(table) * rate_hz(table) / (double)table->period_samples,
+                         table->linear ? "m/s" : "rad/s");
+    }
+    return check_travel_range(plan, out_error);
 }
 
 int measure_check(const struct measure_plan *plan, struct error *out_error)
@@ -95,7 +209,7 @@ int measure_check(const struct measure_plan *plan, struct error *out_error)
             "the excitation",
             torque, table->linear ? "N" : "Nm", plan->limits.torque_max_Nm, table->linear ? "N" : "Nm");
     }
-    return 0;
+    return check_travel(plan, out_error);
 }
 
 struct loop {
@@ -206,12 +320,11 @@ static int exchange(struct loop *self, const struct drive_setpoint *setpoint, st
     return status == drive_ok ? 0 : note_drive_failure(self, "exchange", status, out_error);
 }
 
-/// Until the player is done; the last set-point, sent when it is, is zero.
+/// Until the player is done; the last set-point, sent when it is, is rest at the position reached.
 static int play(struct loop *self, struct error *out_error)
 {
     size_t done = 0;
-    size_t total =
-        self->report->rows_planned + self->player.config.fade_in_samples + self->player.config.fade_out_samples;
+    size_t total = self->report->rows_planned + lead_and_fade_out(&self->player.config);
     for (;;) {
         struct drive_setpoint setpoint;
         struct msgen_player_state state = next_setpoint(self, &setpoint);
@@ -276,13 +389,7 @@ static int prepare(struct loop *self, struct error *out_error)
     const struct measure_plan *plan = self->plan;
     struct guard_real_limits limits = plan->limits;
     limits.watchdog_samples = plan->lost_in_a_row_max ? plan->lost_in_a_row_max : default_lost_in_a_row;
-    uint32_t fade = ramp_or_default(plan, plan->fade_samples);
-    struct msgen_player_config config = {
-        .periods = plan->settle_periods + plan->periods,
-        .fade_in_samples = fade,
-        .fade_out_samples = fade,
-        .abort_samples = ramp_or_default(plan, plan->abort_samples),
-    };
+    const struct msgen_player_config config = player_config(plan);
     enum core_status status = guard_real_init(&self->guard, &limits);
     if (status == core_ok) {
         bool floats = plan->table->format == msgen_format_f32;
@@ -309,6 +416,7 @@ static int finish_run(struct loop *self, struct run *out_run, struct error *out_
     report->rows = self->recorder.rows;
     report->rows_lost = self->recorder.lost;
     report->torque_clipped = self->guard.state.count.torque_clipped;
+    report->end_position_rad = self->sample.position_rad;
     struct recorder_facts facts = {
         .table = plan->table,
         .sample_rate_hz = rate_hz(plan->table),

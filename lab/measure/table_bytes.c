@@ -30,8 +30,7 @@ int table_bytes_read(const char *path, struct table_bytes *out_table, struct err
     if (status) {
         return status;
     }
-    size_t frame = (size_t)table.channels * msgen_format_bytes(table.format);
-    size_t size = msgen_header_bytes + 4 * (size_t)table.bin_count + table.samples * frame;
+    size_t size = table_file_bytes(&table);
     table_free(&table);
     out_table->bytes = read_all(path, size);
     enum core_status opened = core_err_table_truncated;

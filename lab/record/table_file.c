@@ -3,6 +3,7 @@
 
 #include "core/bytes.h"
 #include "core/crc32.h"
+#include "core/fixed.h"
 #include "lab/record/atomic_file.h"
 #include "lab/record/number.h"
 #include "lab/record/text_table.h"
@@ -17,6 +18,9 @@
 
 /* Fewer counts than this make a staircase of the channel: an i16 table at 1/256 of its range. */
 static const double counts_min = 127;
+
+/* A measurement of an i32 table can have at least as many periods before its travel overflows 32 bits. */
+static const double travel_periods = 1024;
 
 static const char *const channel_names[msgen_channels_max] = {"torque", "velocity", "position"};
 
@@ -140,23 +144,25 @@ static void describe_scale(char *detail, const struct msgen_table *view)
 static void describe_envelope(enum core_status status, const uint8_t *bytes, size_t size,
                               const struct msgen_table *view, char *detail)
 {
+    uint32_t header = msgen_header_bytes;
+    if (size > 5 && core_get_u16(bytes + 4) == msgen_table_version_travel)
+        header = msgen_header_travel_bytes;
     switch (status) {
     case core_err_table_truncated:
     case core_err_table_trailing:
-        if (size < msgen_header_bytes)
-            snprintf(detail, detail_size, "%zu bytes, the header alone has %d", size, msgen_header_bytes);
+        if (size < header)
+            snprintf(detail, detail_size, "%zu bytes, the header alone has %" PRIu32, size, header);
         else
-            snprintf(detail, detail_size, "%zu bytes, expected %" PRIu32, size,
-                     msgen_header_bytes + msgen_table_data_bytes(view));
+            snprintf(detail, detail_size, "%zu bytes, expected %" PRIu32, size, header + msgen_table_data_bytes(view));
         break;
     case core_err_table_version:
-        describe_number(detail, core_get_u16(bytes + 4), "1");
+        describe_number(detail, core_get_u16(bytes + 4), "1 or 2");
         break;
     case core_err_table_header_crc:
-        describe_crc(detail, core_get_u32(bytes + 52), bytes, 52);
+        describe_crc(detail, core_get_u32(bytes + view->fault_offset), bytes, view->fault_offset);
         break;
     case core_err_table_data_crc:
-        describe_crc(detail, view->data_crc32, bytes + msgen_header_bytes, size - msgen_header_bytes);
+        describe_crc(detail, view->data_crc32, bytes + header, size - header);
         break;
     case core_err_table_unit:
         describe_range(detail, core_get_u32(bytes + 28), 0, 1);
@@ -174,7 +180,8 @@ static void describe_envelope(enum core_status status, const uint8_t *bytes, siz
 static void describe_field(enum core_status status, const struct msgen_table *view, char *detail)
 {
     uint32_t bin_max = (view->period_samples - 1u) / 2u;
-    uint32_t bin_index = (view->fault_offset - msgen_header_bytes) / 4u;
+    uint32_t header = msgen_table_header_bytes(view);
+    uint32_t bin_index = (view->fault_offset - header) / 4u;
     switch (status) {
     case core_err_table_rate:
         snprintf(detail, detail_size, "found %" PRIu32 "/%" PRIu32 " Hz", view->rate_num_hz, view->rate_den);
@@ -205,7 +212,11 @@ static void describe_field(enum core_status status, const struct msgen_table *vi
         break;
     case core_err_table_sample:
         snprintf(detail, detail_size, "number %" PRIu32 " of the samples",
-                 (view->fault_offset - msgen_header_bytes) / 4u - view->bin_count);
+                 (view->fault_offset - header) / 4u - view->bin_count);
+        break;
+    case core_err_table_travel:
+        snprintf(detail, detail_size, "found %.6g counts in %" PRIu32 " channels, expected up to 2^31, not 0, in 3",
+                 (double)view->travel_q30 / CORE_Q30_ONE, view->channels);
         break;
     default:
         break;
@@ -230,7 +241,7 @@ static int refuse(const char *path, enum core_status status, const uint8_t *byte
 /* The whole file, or as much of it as shows that it is longer than any table. */
 static int read_bytes(const char *path, uint8_t **out_bytes, size_t *out_size, struct error *out_error)
 {
-    static const size_t size_max = msgen_header_bytes + 14u * (size_t)SERVOSCOPE_TABLE_SAMPLES_MAX;
+    static const size_t size_max = msgen_header_travel_bytes + 14u * (size_t)SERVOSCOPE_TABLE_SAMPLES_MAX;
     FILE *stream = fopen(path, "rb");
     if (!stream)
         return error_set(out_error, error_refused, "%s: cannot be read: %s", path, strerror(errno));
@@ -268,6 +279,13 @@ static double sample_of(const struct msgen_table *view, uint32_t n, uint32_t cha
     return scale * number.value;
 }
 
+static double travel_of(const struct msgen_table *view)
+{
+    union core_float_bits scale;
+    scale.bits = view->scale_bits[msgen_channel_position];
+    return view->travel_q30 ? (double)view->travel_q30 / CORE_Q30_ONE * (double)scale.value : 0;
+}
+
 static int copy_view(const char *path, const struct msgen_table *view, struct table *out_table, struct error *out_error)
 {
     if (table_alloc(out_table, view->period_samples, view->channels, view->bin_count, out_error) != error_none)
@@ -280,6 +298,7 @@ static int copy_view(const char *path, const struct msgen_table *view, struct ta
     out_table->format = view->format;
     out_table->linear = view->linear;
     out_table->crc32 = view->header_crc32;
+    out_table->travel_per_period = travel_of(view);
     for (uint32_t b = 0; b < view->bin_count; b++)
         out_table->bins[b] = msgen_table_bin(view, b);
     double *const data[msgen_channels_max] = {out_table->torque, out_table->velocity, out_table->position};
@@ -376,8 +395,10 @@ static int prepare_channel(const char *path, struct table *self, uint32_t channe
         if (!isfinite(data[n]))
             return error_set(out_error, error_refused, "%s: %s: sample %" PRIu32 " is %g, a finite number was expected",
                              path, channel_names[channel], n, data[n]);
-    if (self->scale[channel] == 0 &&
-        choose_scale(path, self, channel, peak_of(data, self->samples), out_error) != error_none)
+    double most_played = peak_of(data, self->samples);
+    if (channel == msgen_channel_position && self->format == msgen_format_i32)
+        most_played += travel_periods * fabs(self->travel_per_period);
+    if (self->scale[channel] == 0 && choose_scale(path, self, channel, most_played, out_error) != error_none)
         return error_refused;
     if (!(self->scale[channel] >= FLT_MIN && self->scale[channel] <= FLT_MAX))
         return error_set(out_error, error_refused, "%s: %s: a scale of %g: a positive number was expected", path,
@@ -441,6 +462,34 @@ static struct msgen_table header_of(const struct table *self)
     return header;
 }
 
+/* Once the position's scale is known. Rounding moves the speed by less than 2^-30 counts a period. */
+static int prepare_travel(const char *path, const struct table *self, int64_t *out_travel_q30, struct error *out_error)
+{
+    *out_travel_q30 = 0;
+    if (self->travel_per_period == 0)
+        return error_none;
+    double count = self->channels > msgen_channel_position
+                       ? self->travel_per_period / (double)self->scale[msgen_channel_position]
+                       : NAN;
+    if (!(fabs(count) <= count_max(msgen_format_i32)))
+        return error_set(
+            out_error, error_refused, "%s: travel of %g per period: at most %g was expected, in a table of 3 channels",
+            path, self->travel_per_period, count_max(msgen_format_i32) * (double)self->scale[msgen_channel_position]);
+    *out_travel_q30 = llrint(count * CORE_Q30_ONE);
+    if (*out_travel_q30 != 0)
+        return error_none;
+    return error_set(out_error, error_refused,
+                     "%s: travel of %g per period: 0, or at least %g was expected, a 2^30th of the position's scale",
+                     path, self->travel_per_period, (double)self->scale[msgen_channel_position] / CORE_Q30_ONE);
+}
+
+size_t table_file_bytes(const struct table *self)
+{
+    uint32_t header = self->travel_per_period != 0 ? msgen_header_travel_bytes : msgen_header_bytes;
+    return header + 4 * (size_t)self->bin_count +
+           (size_t)self->samples * self->channels * msgen_format_bytes(self->format);
+}
+
 /* The bytes of the .mst file, which the caller frees. What is written has passed the check that firmware will make. */
 static int encode(const char *path, struct table *self, uint8_t **out_bytes, size_t *out_size, struct error *out_error)
 {
@@ -449,6 +498,9 @@ static int encode(const char *path, struct table *self, uint8_t **out_bytes, siz
         self->format = msgen_format_i32;
     if (!self->bins)
         return error_set(out_error, error_refused, "%s: a table without excited bins", path);
+    if (!isfinite(self->travel_per_period))
+        return error_set(out_error, error_refused, "%s: travel of %g per period: a finite number was expected", path,
+                         self->travel_per_period);
     struct msgen_table header = header_of(self);
     for (uint32_t c = 0; c < msgen_channels_max && c < self->channels; c++)
         header.scale_bits[c] = 0x3F800000u; /* 1.0f: the sizes are judged before the samples are looked at */
@@ -459,12 +511,15 @@ static int encode(const char *path, struct table *self, uint8_t **out_bytes, siz
         if (prepare_channel(path, self, c, out_error) != error_none)
             return error_refused;
     header = header_of(self);
-    size_t size = msgen_header_bytes + (size_t)msgen_table_data_bytes(&header);
+    if (prepare_travel(path, self, &header.travel_q30, out_error) != error_none)
+        return error_refused;
+    size_t header_bytes = msgen_table_header_bytes(&header);
+    size_t size = table_file_bytes(self);
     uint8_t *bytes = malloc(size);
     if (!bytes)
         return error_set(out_error, error_refused, "%s: memory is short for a table of %zu bytes", path, size);
-    put_data(self, bytes + msgen_header_bytes);
-    header.data_crc32 = core_crc32(0, bytes + msgen_header_bytes, size - msgen_header_bytes);
+    put_data(self, bytes + header_bytes);
+    header.data_crc32 = core_crc32(0, bytes + header_bytes, size - header_bytes);
     status = msgen_table_encode_header(&header, bytes);
     if (status == core_ok)
         status = msgen_table_open(bytes, size, &header);
@@ -500,7 +555,13 @@ static void write_keys(FILE *stream, const struct table *self)
     fprintf(stream, "# sample_rate_hz: %s\n# period_samples: %" PRIu32 "\n", rate, self->samples);
     for (uint32_t b = 0; b < self->bin_count; b++)
         fprintf(stream, "%s%" PRIu32, b ? ", " : "# excited_bins: [", self->bins[b]);
-    fprintf(stream, "]\n# start_index: %" PRIu32 "\n# table_crc32: 0x%08" PRIx32 "\n", self->start_index, self->crc32);
+    fprintf(stream, "]\n# start_index: %" PRIu32 "\n", self->start_index);
+    if (self->travel_per_period != 0) {
+        char travel[number_text_size];
+        number_format(self->travel_per_period, travel);
+        fprintf(stream, "# travel_per_period_%s: %s\n", self->linear ? "m" : "rad", travel);
+    }
+    fprintf(stream, "# table_crc32: 0x%08" PRIx32 "\n", self->crc32);
 }
 
 static void write_columns(FILE *stream, const struct table *self, double *sample_index)

@@ -28,6 +28,9 @@ struct table {
     uint32_t start_index;            ///< sample at which playing begins
     enum msgen_format format;        ///< 0: i32
     float scale[msgen_channels_max]; ///< SI per count; 0: chosen when written, so that the peak fills the format
+    /// What the position gains in each period beside `position`, rad (linear: m): the table plays around a constant
+    /// speed, which is in `velocity` (msgen/player.h, travel). 0: none. Needs 3 channels.
+    double travel_per_period;
     bool linear;
     uint32_t crc32; ///< set by reading and by every write
 };
@@ -51,19 +54,25 @@ int table_file_read(const char *path, struct table *out_table, struct error *out
 /// Writes an .mst file, and sets scale[] where it was 0, format where it was 0, and crc32.
 /// Quantisation: x = scale * count, rounded to nearest. A chosen scale puts the largest |x| of a channel on the largest
 ///               count of the format, so values written are off by at most peak / 65534 (i16) or peak / 4.3e9 (i32).
+///               The position of an i32 table that travels gets a scale at which the peak and 1024 periods of travel
+///               fill the format, because the player's output has 32 bits. Travel is written in 2^-30 counts.
 /// Errors: error_refused, nothing written: a value that is not finite, does not fit its format at the given scale, or
 /// leaves
 ///         a channel with fewer than 127 counts; sizes, rate, bins, start index out of range
 int table_file_write_mst(const char *path, struct table *self, struct error *out_error);
 
 /// Writes the table as text: `n,torque_Nm,position_rad,velocity_rad_per_s,acceleration_rad_per_s2` (what is there of
-/// it; the linear twins if self->linear), keys sample_rate_hz, period_samples, excited_bins, start_index, table_crc32
-/// before. The values are the exact ones, before quantisation. Errors and effects on *self as table_file_write_mst().
+/// it; the linear twins if self->linear), keys sample_rate_hz, period_samples, excited_bins, start_index,
+/// travel_per_period_rad (_m; only with travel), table_crc32 before. The values are exact, as before quantisation.
+/// Errors and effects on *self as table_file_write_mst().
 int table_file_write_csv(const char *path, struct table *self, struct error *out_error);
 
 /// Writes the bytes of the .mst file as a const C array for a firmware's flash, to be opened with msgen_table_open().
 /// C99 and C++; names are made of the file's name. Errors and effects on *self as table_file_write_mst().
 int table_file_write_header(const char *path, struct table *self, struct error *out_error);
+
+/// Length of the .mst file that this table is or will be, in bytes.
+size_t table_file_bytes(const struct table *self);
 
 /// Frees all arrays and empties *self; harmless on an empty one.
 void table_free(struct table *self);

@@ -29,11 +29,13 @@ enum core_status {
     core_err_table_bin_range = -26, ///< bin at or above N/2
     core_err_table_start = -27,     ///< start index at or above N
     core_err_table_sample = -28,    ///< a float sample that is not finite
+    core_err_table_travel = -29,    ///< travel of none, of more than 2^31 counts, or of a table without position
 
     core_err_player_format = -40,  ///< table in the number format of the other path (integer, float)
-    core_err_player_fade = -41,    ///< fade or abort ramp too long, or an abort ramp of no length
+    core_err_player_fade = -41,    ///< ramp too long, abort ramp of no length, or fade in and approach
     core_err_player_periods = -42, ///< no periods
     core_err_player_limit = -43,   ///< output limit negative
+    core_err_player_travel = -44,  ///< the travel of all periods does not fit the output
 
     core_err_frf_period = -50,   ///< N outside 4 .. SERVOSCOPE_FRF_PERIOD_MAX, or not that of the twiddle table
     core_err_frf_bins = -51,     ///< no bins, too many, not strictly ascending from 1, or at or above N/2

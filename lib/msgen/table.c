@@ -18,7 +18,8 @@ enum {
     offset_scale = 32,
     offset_data_bytes = 44,
     offset_data_crc = 48,
-    offset_header_crc = 52,
+    offset_header_crc = 52, /* version 1; the last 4 bytes of the header in either */
+    offset_travel = 52,     /* version 2 */
 };
 
 static const uint8_t magic[4] = {'M', 'S', 'T', 0x1A};
@@ -26,6 +27,10 @@ static const uint8_t magic[4] = {'M', 'S', 'T', 0x1A};
 /* 4 K < 2 N and 12 N at most: below 2^21 + 12 * 2^20 */
 CORE_STATIC_ASSERT(SERVOSCOPE_TABLE_SAMPLES_MAX <= 0xFFFFFFFFu / 16u, data_length_fits_32_bits);
 CORE_STATIC_ASSERT(offset_header_crc + 4 == msgen_header_bytes, header_ends_with_its_crc);
+CORE_STATIC_ASSERT(offset_travel + 8 + 4 == msgen_header_travel_bytes, header_with_travel_ends_with_its_crc);
+
+/* 2^31 counts: more than the integer player can put out. */
+static const uint64_t travel_max_q30 = (uint64_t)1 << 61;
 
 uint32_t msgen_format_bytes(enum msgen_format format)
 {
@@ -42,6 +47,11 @@ uint32_t msgen_format_bytes(enum msgen_format format)
 uint32_t msgen_table_data_bytes(const struct msgen_table *self)
 {
     return 4u * self->bin_count + self->period_samples * self->channels * msgen_format_bytes(self->format);
+}
+
+uint32_t msgen_table_header_bytes(const struct msgen_table *self)
+{
+    return self->travel_q30 != 0 ? msgen_header_travel_bytes : msgen_header_bytes;
 }
 
 uint32_t msgen_table_bin(const struct msgen_table *self, uint32_t index)
@@ -67,6 +77,18 @@ uint32_t msgen_table_float_bits(const struct msgen_table *self, uint32_t n, uint
 static bool scale_is_usable(uint32_t bits)
 {
     return bits >= 0x00800000u && bits < 0x7F800000u;
+}
+
+/* Two's complement as an unsigned number: the magnitude of the most negative value too. */
+static uint64_t magnitude_of(int64_t value)
+{
+    return value < 0 ? (uint64_t)0 - (uint64_t)value : (uint64_t)value;
+}
+
+static bool travel_is_usable(const struct msgen_table *table)
+{
+    return table->travel_q30 == 0 ||
+           (table->channels > msgen_channel_position && magnitude_of(table->travel_q30) <= travel_max_q30);
 }
 
 static enum core_status check_scales(const struct msgen_table *table, uint32_t *out_offset)
@@ -112,7 +134,12 @@ static enum core_status check_fields(const struct msgen_table *table, uint32_t *
     if (table->start_index >= table->period_samples) {
         return core_err_table_start;
     }
-    return check_scales(table, out_offset);
+    enum core_status status = check_scales(table, out_offset);
+    if (status != core_ok) {
+        return status;
+    }
+    *out_offset = offset_travel;
+    return travel_is_usable(table) ? core_ok : core_err_table_travel;
 }
 
 static enum core_status check_bins(const struct msgen_table *table, uint32_t *out_offset)
@@ -120,7 +147,7 @@ static enum core_status check_bins(const struct msgen_table *table, uint32_t *ou
     uint32_t previous = 0;
     for (uint32_t i = 0; i < table->bin_count; ++i) {
         uint32_t bin = msgen_table_bin(table, i);
-        *out_offset = msgen_header_bytes + 4u * i;
+        *out_offset = msgen_table_header_bytes(table) + 4u * i;
         if (bin <= previous) {
             return core_err_table_bin_order;
         }
@@ -140,11 +167,18 @@ static enum core_status check_samples(const struct msgen_table *table, uint32_t 
     uint32_t count = table->period_samples * table->channels;
     for (uint32_t i = 0; i < count; ++i) {
         if (!core_float_bits_are_finite(core_get_u32(table->samples + 4u * (size_t)i))) {
-            *out_offset = msgen_header_bytes + 4u * table->bin_count + 4u * i;
+            *out_offset = msgen_table_header_bytes(table) + 4u * table->bin_count + 4u * i;
             return core_err_table_sample;
         }
     }
     return core_ok;
+}
+
+/* Two's complement; the conversion of a value above the signed maximum is implementation-defined in C99. */
+static int64_t get_travel(const uint8_t *bytes)
+{
+    uint64_t bits = core_get_u32(bytes + offset_travel) | (uint64_t)core_get_u32(bytes + offset_travel + 4u) << 32;
+    return bits >> 63 ? -(int64_t)~bits - 1 : (int64_t)bits;
 }
 
 static enum core_status check_envelope(const uint8_t *bytes, size_t size, uint32_t *out_offset)
@@ -159,13 +193,22 @@ static enum core_status check_envelope(const uint8_t *bytes, size_t size, uint32
     if (size < msgen_header_bytes) {
         return core_err_table_truncated;
     }
+    uint32_t version = core_get_u16(bytes + offset_version);
     *out_offset = offset_version;
-    if (core_get_u16(bytes + offset_version) != msgen_table_version) {
+    if (version != msgen_table_version && version != msgen_table_version_travel) {
         return core_err_table_version;
     }
-    *out_offset = offset_header_crc;
-    if (core_get_u32(bytes + offset_header_crc) != core_crc32(0, bytes, offset_header_crc)) {
+    uint32_t header_bytes = version == msgen_table_version ? msgen_header_bytes : msgen_header_travel_bytes;
+    *out_offset = (uint32_t)(size < header_bytes ? size : header_bytes - 4u);
+    if (size < header_bytes) {
+        return core_err_table_truncated;
+    }
+    if (core_get_u32(bytes + header_bytes - 4u) != core_crc32(0, bytes, header_bytes - 4u)) {
         return core_err_table_header_crc;
+    }
+    *out_offset = offset_travel;
+    if (version == msgen_table_version_travel && get_travel(bytes) == 0) {
+        return core_err_table_travel;
     }
     *out_offset = offset_unit;
     return core_get_u32(bytes + offset_unit) <= 1u ? core_ok : core_err_table_unit;
@@ -185,7 +228,9 @@ static void decode_header(const uint8_t *bytes, struct msgen_table *out_table)
         out_table->scale_bits[c] = core_get_u32(bytes + offset_scale + 4u * c);
     }
     out_table->data_crc32 = core_get_u32(bytes + offset_data_crc);
-    out_table->header_crc32 = core_get_u32(bytes + offset_header_crc);
+    bool travels = core_get_u16(bytes + offset_version) == msgen_table_version_travel;
+    out_table->travel_q30 = travels ? get_travel(bytes) : 0;
+    out_table->header_crc32 = core_get_u32(bytes + msgen_table_header_bytes(out_table) - 4u);
 }
 
 enum core_status msgen_table_open(const uint8_t *bytes, size_t size, struct msgen_table *out_table)
@@ -207,12 +252,13 @@ enum core_status msgen_table_open(const uint8_t *bytes, size_t size, struct msge
     if (core_get_u32(bytes + offset_data_bytes) != data_bytes) {
         return core_err_table_size;
     }
-    if (size - msgen_header_bytes != data_bytes) {
-        bool is_short = size - msgen_header_bytes < data_bytes;
-        out_table->fault_offset = is_short ? (uint32_t)size : msgen_header_bytes + data_bytes;
+    uint32_t header_bytes = msgen_table_header_bytes(out_table);
+    if (size - header_bytes != data_bytes) {
+        bool is_short = size - header_bytes < data_bytes;
+        out_table->fault_offset = is_short ? (uint32_t)size : header_bytes + data_bytes;
         return is_short ? core_err_table_truncated : core_err_table_trailing;
     }
-    out_table->bins = bytes + msgen_header_bytes;
+    out_table->bins = bytes + header_bytes;
     out_table->samples = out_table->bins + 4u * (size_t)out_table->bin_count;
     out_table->fault_offset = offset_data_crc;
     if (core_crc32(0, out_table->bins, data_bytes) != out_table->data_crc32) {
@@ -225,7 +271,7 @@ enum core_status msgen_table_open(const uint8_t *bytes, size_t size, struct msge
     return check_samples(out_table, &out_table->fault_offset);
 }
 
-enum core_status msgen_table_encode_header(const struct msgen_table *self, uint8_t out_bytes[msgen_header_bytes])
+enum core_status msgen_table_encode_header(const struct msgen_table *self, uint8_t *out_bytes)
 {
     if (!self || !out_bytes) {
         return core_err_argument;
@@ -238,7 +284,7 @@ enum core_status msgen_table_encode_header(const struct msgen_table *self, uint8
     for (uint32_t i = 0; i < sizeof magic; ++i) {
         out_bytes[i] = magic[i];
     }
-    core_put_u16(out_bytes + offset_version, msgen_table_version);
+    core_put_u16(out_bytes + offset_version, self->travel_q30 ? msgen_table_version_travel : msgen_table_version);
     out_bytes[offset_channels] = (uint8_t)self->channels;
     out_bytes[offset_format] = (uint8_t)self->format;
     core_put_u32(out_bytes + offset_rate_num, self->rate_num_hz);
@@ -252,6 +298,11 @@ enum core_status msgen_table_encode_header(const struct msgen_table *self, uint8
     }
     core_put_u32(out_bytes + offset_data_bytes, msgen_table_data_bytes(self));
     core_put_u32(out_bytes + offset_data_crc, self->data_crc32);
-    core_put_u32(out_bytes + offset_header_crc, core_crc32(0, out_bytes, offset_header_crc));
+    if (self->travel_q30 != 0) {
+        core_put_u32(out_bytes + offset_travel, (uint32_t)((uint64_t)self->travel_q30 & 0xFFFFFFFFu));
+        core_put_u32(out_bytes + offset_travel + 4u, (uint32_t)((uint64_t)self->travel_q30 >> 32));
+    }
+    uint32_t crc_offset = msgen_table_header_bytes(self) - 4u;
+    core_put_u32(out_bytes + crc_offset, core_crc32(0, out_bytes, crc_offset));
     return core_ok;
 }

@@ -5,7 +5,7 @@
 ///
 ///     offset size
 ///          0    4  magic: 'M' 'S' 'T' 0x1A
-///          4    2  version: 1
+///          4    2  version: 1, or 2 for a table whose position travels
 ///          6    1  channels: 1 torque; 2 torque, velocity; 3 torque, velocity, position
 ///          7    1  number format: 1 i16, 2 i32, 3 f32
 ///          8    4  sampling rate, numerator, Hz
@@ -17,9 +17,15 @@
 ///         32   12  scale of each channel, float bits, SI per count; 0 for channels that are not there
 ///         44    4  length of the data in bytes: 4 K + N * channels * bytes per number
 ///         48    4  CRC-32 of the data
-///         52    4  CRC-32 of the 52 bytes before: as it covers the data's CRC, this one number names the table
-///         56  4 K  excited bins, u32, strictly ascending from 1, below N/2
+///         52    4  version 1: CRC-32 of the 52 bytes before: as it covers the data's CRC, it names the table
+///         52    8  version 2: travel per period, i64, in 2^-30 counts of the position channel: not 0, at most 2^61
+///         60    4  version 2: CRC-32 of the 60 bytes before, the table's name
+///         56 or 64 excited bins, 4 K bytes, u32, strictly ascending from 1, below N/2
 ///          .    .  N frames of `channels` numbers: torque, velocity, position
+///
+/// Version 2 is for an excitation around a constant speed (msgen/player.h, travel): the velocity's samples hold that
+/// speed, the position's samples hold what is periodic of the position, and the travel is what it gains in each period.
+/// A table without travel is version 1, so that every table has one encoding.
 ///
 /// No float instruction is needed to check or to play an integer table.
 #ifndef SERVOSCOPE_MSGEN_TABLE_H
@@ -32,7 +38,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { msgen_channels_max = 3, msgen_header_bytes = 56, msgen_table_version = 1 };
+enum {
+    msgen_channels_max = 3,
+    msgen_header_bytes = 56,        ///< of version 1
+    msgen_header_travel_bytes = 64, ///< of version 2
+    msgen_table_version = 1,
+    msgen_table_version_travel = 2,
+};
 
 /// Order of the channels in a frame.
 enum msgen_channel {
@@ -60,6 +72,7 @@ struct msgen_table {
     uint32_t header_crc32; ///< names the table: `table_crc32` of every file
     uint32_t channels;
     enum msgen_format format;
+    int64_t travel_q30;    ///< counts of the position channel per period, times 2^30; 0: none, which is version 1
     bool linear;           ///< N, m/s, m instead of Nm, rad/s, rad
     uint32_t fault_offset; ///< after a refusal: offset of the first byte of what was refused
 };
@@ -75,8 +88,12 @@ enum core_status msgen_table_open(const uint8_t *bytes, size_t size, struct msge
 
 /// Writes the header that belongs to a table whose fields are filled in (all but bins, samples, header_crc32).
 /// data_crc32 is the CRC-32 of the bins and frames that will follow. The last four bytes written are the table's name.
+/// Shapes:   out_bytes: msgen_table_header_bytes(self)
 /// Errors:   as msgen_table_open() for every field of the header; out_bytes is untouched then
-enum core_status msgen_table_encode_header(const struct msgen_table *self, uint8_t out_bytes[msgen_header_bytes]);
+enum core_status msgen_table_encode_header(const struct msgen_table *self, uint8_t *out_bytes);
+
+/// Length of the header: 56 bytes, 64 with travel.
+uint32_t msgen_table_header_bytes(const struct msgen_table *self);
 
 /// Bytes of one number: 2 or 4, 0 for a format that does not exist.
 uint32_t msgen_format_bytes(enum msgen_format format);

@@ -13,7 +13,7 @@
 static const double two_pi = 6.283185307179586476925;
 
 enum { samples = 48, settle = 1, periods = 2, fade = 20, ramp = 12, start = 5, rows = (settle + periods) * samples };
-enum { trace_max = 400 };
+enum { trace_max = 1400 };
 /// Tables are float32: 24 bits of a value of at most 2.
 static const double float_rounding = 5e-7;
 
@@ -35,7 +35,7 @@ struct fake_drive {
 };
 
 static struct fake_drive fake;
-static uint8_t table_storage[msgen_header_bytes + 4 * 3 + 12 * samples];
+static uint8_t table_storage[msgen_header_travel_bytes + 4 * 3 + 12 * samples];
 static struct msgen_table table;
 static volatile sig_atomic_t stop_flag;
 static struct run run;
@@ -120,7 +120,7 @@ static double table_torque(size_t n)
     return cos(t) + 0.5 * cos(3.0 * t + 1.0) + 0.5 * cos(7.0 * t + 2.0);
 }
 
-static void make_table(uint32_t channels)
+static void make_table_that_travels(uint32_t channels, double travel_rad)
 {
     struct msgen_table header = {.rate_num_hz = 1000,
                                  .rate_den = 1,
@@ -128,12 +128,13 @@ static void make_table(uint32_t channels)
                                  .bin_count = 3,
                                  .start_index = start,
                                  .channels = channels,
-                                 .format = msgen_format_f32};
+                                 .format = msgen_format_f32,
+                                 .travel_q30 = (int64_t)(travel_rad * 1073741824.0)};
     union core_float_bits number = {.value = 1.0f};
     for (uint32_t c = 0; c < channels; c++) {
         header.scale_bits[c] = number.bits;
     }
-    uint8_t *data = table_storage + msgen_header_bytes;
+    uint8_t *data = table_storage + msgen_table_header_bytes(&header);
     const uint32_t bins[3] = {1, 3, 7};
     for (size_t b = 0; b < 3; b++) {
         core_put_u32(data + 4 * b, bins[b]);
@@ -147,7 +148,13 @@ static void make_table(uint32_t channels)
     size_t size = 12 + 4 * samples * channels;
     header.data_crc32 = core_crc32(0, data, size);
     TEST_ASSERT_EQUAL_INT(core_ok, msgen_table_encode_header(&header, table_storage));
-    TEST_ASSERT_EQUAL_INT(core_ok, msgen_table_open(table_storage, msgen_header_bytes + size, &table));
+    size += msgen_table_header_bytes(&header);
+    TEST_ASSERT_EQUAL_INT(core_ok, msgen_table_open(table_storage, size, &table));
+}
+
+static void make_table(uint32_t channels)
+{
+    make_table_that_travels(channels, 0.0);
 }
 
 static struct measure_plan make_plan(void)
@@ -409,6 +416,199 @@ static void test_measure_default_ramp_adds_at_most_the_tables_own_speed(void)
     TEST_ASSERT_EQUAL_UINT32(50, measure_ramp_samples(&table, drive_mode_torque));
 }
 
+static const double travel = -3.0;
+
+/// Set-points: at most the table's step, the ramp's and the speed's; at the end at rest.
+static void check_travels(size_t shortest_ramp)
+{
+    double step = 0.0;
+    double peak = 0.0;
+    for (size_t n = 0; n < samples; n++) {
+        step = fmax(step, 0.25 * fabs(table_torque(n + 1) - table_torque(n)));
+        peak = fmax(peak, 0.25 * fabs(table_torque(n)));
+    }
+    double bound = step + 1.5 * peak / (double)shortest_ramp + fabs(travel) / samples + 10.0 * float_rounding;
+    for (size_t i = 1; i < fake.exchanges; i++) {
+        TEST_ASSERT_TRUE(fabs(fake.trace[i].position_rad - fake.trace[i - 1].position_rad) <= bound);
+    }
+    const struct drive_setpoint *last = &fake.trace[fake.exchanges - 1];
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, last->torque_Nm);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, last->velocity_rad_per_s);
+    TEST_ASSERT_TRUE(fake.stopped);
+}
+
+static void test_measure_travels_and_rests_where_it_has_got_to(void)
+{
+    make_table_that_travels(3, travel);
+    struct measure_plan plan = make_plan();
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, measure(&plan), error.message);
+    const double *position_ref = run_column(&run, "position_ref_rad");
+    const double *position = run_column(&run, "position_rad");
+    const double fade_travel = travel * 0.5 * (fade - 1) / samples; /* the sum of s(t): its first sample is 0 */
+    for (size_t n = 0; n < run.rows; n++) {
+        double expected = 0.25 * table_torque(start + n) + fade_travel + travel * (double)n / samples;
+        TEST_ASSERT_DOUBLE_WITHIN(1e-5, expected, position_ref[n]);
+        TEST_ASSERT_EQUAL_DOUBLE(position_ref[n], position[n]);
+        if (n >= samples) {
+            TEST_ASSERT_DOUBLE_WITHIN(1e-5, travel, position_ref[n] - position_ref[n - samples]);
+        }
+    }
+    check_travels(fade);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, travel * (settle + periods + (double)(fade - 1) / samples),
+                              fake.trace[fake.exchanges - 1].position_rad);
+    check_file_is_whole(rows);
+}
+
+static void test_measure_that_travels_stops_at_rest_when_interrupted_at_any_exchange(void)
+{
+    struct measure_plan plan = make_plan();
+    for (size_t at = 2; at <= 1 + fade + rows + fade; at++) {
+        setUp();
+        make_table_that_travels(3, travel);
+        fake.interrupt_at = at;
+        TEST_ASSERT_EQUAL_INT(error_refused, measure(&plan));
+        TEST_ASSERT_EQUAL_INT(measure_interrupted, report.end);
+        check_travels(ramp);
+        /* Not further than where it was told to stop, half a ramp and what the table itself is away; and not back. */
+        double told = fake.trace[at - 1].position_rad;
+        double last = fake.trace[fake.exchanges - 1].position_rad;
+        TEST_ASSERT_TRUE(fabs(last - told) <= 0.5 + fabs(travel) * (0.5 * ramp + 1.0) / samples);
+        TEST_ASSERT_TRUE(fake.exchanges <= at + ramp + 1);
+    }
+}
+
+static void test_measure_refuses_travel_that_cannot_work(void)
+{
+    make_table_that_travels(3, travel);
+    struct measure_plan plan = make_plan();
+    plan.mode = drive_mode_torque;
+    TEST_ASSERT_EQUAL_INT(error_refused, measure(&plan));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "constant speed of -62.5 rad/s"), error.message);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "expected --mode cascade"), error.message);
+    plan = make_plan();
+    plan.limits.position_min_rad = -9.0; /* two periods, 20/48 of one for the ramps, and the table's own 0.4 rad fit */
+    TEST_ASSERT_EQUAL_INT(error_refused, measure(&plan));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "which has room for 2 periods, settling ones included"),
+                                 error.message);
+    TEST_ASSERT_EQUAL_size_t(0, fake.exchanges);
+    plan.periods = 1;
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, measure(&plan), error.message);
+    plan.limits.position_min_rad = -100.0;
+    plan.limits.position_max_rad = 0.1; /* the table's own positive peak */
+    TEST_ASSERT_EQUAL_INT(error_refused, measure(&plan));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "-100..0.1"), error.message);
+}
+
+static void test_measure_ramp_to_a_speed_takes_no_more_than_the_tables_acceleration(void)
+{
+    make_table_that_travels(3, 20.0); /* in 48 ms: far above the table's own speed */
+    double step = 0.0;
+    for (size_t n = 0; n < samples; n++) {
+        step = fmax(step, 0.5 * fabs(table_torque(n + 1) - table_torque(n)));
+    }
+    double speed_rad_per_s = 20.0 / 0.048;
+    double expected = ceil(1.5 * speed_rad_per_s / step);
+    TEST_ASSERT_UINT32_WITHIN(1, (uint32_t)expected, measure_ramp_samples(&table, drive_mode_cascade));
+    TEST_ASSERT_TRUE(expected > 750);
+}
+
+/// At 1 kHz; what is played before row 0 without a fade in, after the exchange that arms.
+enum { dwell = 1000, lead = fade + dwell };
+
+static struct measure_plan make_plan_without_fade_in(void)
+{
+    struct measure_plan plan = make_plan();
+    plan.without_fade_in = true;
+    return plan;
+}
+
+static double smooth(double t)
+{
+    return t * t * (3.0 - 2.0 * t);
+}
+
+static void test_measure_without_fade_in_stands_at_the_start_before_row_0(void)
+{
+    const double target = 0.25 * table_torque(start);
+    struct measure_plan plan = make_plan_without_fade_in();
+    TEST_ASSERT_EQUAL_DOUBLE(dwell / 1000.0, measure_dwell_s);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, measure(&plan), error.message);
+    TEST_ASSERT_EQUAL_size_t(1 + lead + rows + fade + 1, fake.exchanges);
+    for (size_t i = 0; i < lead; i++) {
+        const struct drive_setpoint *sent = &fake.trace[1 + i];
+        double factor = i < fade ? smooth((double)i / fade) : 1.0;
+        TEST_ASSERT_EQUAL_DOUBLE(0.0, sent->torque_Nm);
+        TEST_ASSERT_EQUAL_DOUBLE(0.0, sent->velocity_rad_per_s);
+        TEST_ASSERT_DOUBLE_WITHIN(float_rounding, factor * target, sent->position_rad);
+    }
+    TEST_ASSERT_EQUAL_size_t(rows, run.rows);
+    check_rows_are_the_table();
+    check_ends_at_zero();
+    check_file_is_whole(rows);
+}
+
+static void test_measure_approach_runs_back_when_interrupted_at_any_exchange(void)
+{
+    struct measure_plan plan = make_plan_without_fade_in();
+    for (size_t at = 2; at <= 1 + lead; at++) {
+        setUp();
+        fake.interrupt_at = at;
+        TEST_ASSERT_EQUAL_INT(error_refused, measure(&plan));
+        TEST_ASSERT_EQUAL_INT(measure_interrupted, report.end);
+        TEST_ASSERT_EQUAL_size_t(0, run.rows);
+        check_steps(ramp);
+        check_ends_at_zero();
+        TEST_ASSERT_TRUE(fake.exchanges <= at + ramp + 1);
+    }
+}
+
+static void test_measure_approach_is_guarded(void)
+{
+    struct measure_plan plan = make_plan_without_fade_in();
+    const double target = 0.25 * table_torque(start);
+    plan.limits.position_max_rad = fmax(0.5 * target, 1e-3);
+    plan.limits.position_min_rad = fmin(0.5 * target, -1e-3);
+    TEST_ASSERT_EQUAL_INT(error_refused, measure(&plan));
+    TEST_ASSERT_EQUAL_INT(measure_tripped, report.end);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(report.stopped_by, "travel limit"), report.stopped_by);
+    TEST_ASSERT_EQUAL_size_t(0, run.rows);
+    TEST_ASSERT_TRUE(fake.exchanges <= 1 + fade + ramp + 1);
+    check_steps(ramp);
+    check_ends_at_zero();
+}
+
+static void test_measure_without_fade_in_has_nothing_to_approach_in_torque_mode(void)
+{
+    struct measure_plan plan = make_plan_without_fade_in();
+    plan.mode = drive_mode_torque;
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, measure(&plan), error.message);
+    TEST_ASSERT_EQUAL_size_t(1 + rows + fade + 1, fake.exchanges);
+    TEST_ASSERT_DOUBLE_WITHIN(float_rounding, table_torque(start), fake.trace[1].torque_Nm);
+    TEST_ASSERT_DOUBLE_WITHIN(float_rounding, table_torque(start), run_column(&run, "torque_Nm")[0]);
+    check_ends_at_zero();
+}
+
+static void test_measure_approach_of_a_table_that_travels_sets_off_with_it(void)
+{
+    make_table_that_travels(3, travel);
+    struct measure_plan plan = make_plan_without_fade_in();
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, measure(&plan), error.message);
+    check_travels(fade);
+    for (size_t i = 1 + fade; i < 1 + lead; i++) {
+        const double step = fake.trace[i + 1].position_rad - fake.trace[i].position_rad;
+        TEST_ASSERT_DOUBLE_WITHIN(1e-4, travel * 1000.0 / samples, fake.trace[i].velocity_rad_per_s);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-5, travel / samples, step); /* up to row 0, which goes on from there */
+    }
+    /* The periods, the dwell, half of each ramp; the table's own range. */
+    const double needed = fabs(travel) * (settle + periods + (double)(dwell + fade) / samples);
+    plan.limits.position_max_rad = 1.0;
+    plan.limits.position_min_rad = -(needed + 1.0);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, measure_check(&plan, &error), error.message);
+    plan.limits.position_min_rad = -needed;
+    TEST_ASSERT_EQUAL_INT(error_refused, measure_check(&plan, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "which has room for 2 periods"), error.message);
+}
+
 int main(void)
 {
     scratch_open();
@@ -423,6 +623,15 @@ int main(void)
     RUN_TEST(test_measure_says_why_the_drive_did_not_start);
     RUN_TEST(test_measure_refuses_plans_that_cannot_work);
     RUN_TEST(test_measure_default_ramp_adds_at_most_the_tables_own_speed);
+    RUN_TEST(test_measure_travels_and_rests_where_it_has_got_to);
+    RUN_TEST(test_measure_that_travels_stops_at_rest_when_interrupted_at_any_exchange);
+    RUN_TEST(test_measure_refuses_travel_that_cannot_work);
+    RUN_TEST(test_measure_ramp_to_a_speed_takes_no_more_than_the_tables_acceleration);
+    RUN_TEST(test_measure_without_fade_in_stands_at_the_start_before_row_0);
+    RUN_TEST(test_measure_approach_runs_back_when_interrupted_at_any_exchange);
+    RUN_TEST(test_measure_approach_is_guarded);
+    RUN_TEST(test_measure_without_fade_in_has_nothing_to_approach_in_torque_mode);
+    RUN_TEST(test_measure_approach_of_a_table_that_travels_sets_off_with_it);
     int failures = UNITY_END();
     scratch_close();
     return failures;

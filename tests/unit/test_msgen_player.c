@@ -328,6 +328,36 @@ static void test_player_puts_out_zero_for_the_other_format(void)
     TEST_ASSERT_EACH_EQUAL_INT32(0, out, channels);
 }
 
+/* CRC-32 of everything that a run with an abort puts out. */
+static uint32_t crc_of_run(enum msgen_format format, unsigned abort_at)
+{
+    build(format, 17);
+    struct msgen_player player;
+    struct msgen_player_config config = usual();
+    config.gain_q16[1] = -3 * msgen_gain_one;
+    start(&player, &config);
+    uint32_t crc = 0;
+    for (unsigned s = 0; s < fade_in + periods * samples + fade_out + 5; s++) {
+        int32_t out[channels];
+        uint8_t frame[4 * channels];
+        if (s == abort_at)
+            msgen_player_abort(&player);
+        msgen_player_step(&player, out);
+        for (unsigned c = 0; c < channels; c++)
+            core_put_u32(frame + 4 * c, (uint32_t)out[c]);
+        crc = core_crc32(crc, frame, sizeof frame);
+    }
+    return crc;
+}
+
+static void test_player_without_travel_puts_out_the_same_bits_as_ever(void)
+{
+    /* Made by the player of version 1 tables, before there was travel. */
+    TEST_ASSERT_EQUAL_HEX32(0x74634ec1, crc_of_run(msgen_format_i16, UINT32_MAX));
+    TEST_ASSERT_EQUAL_HEX32(0x646d4327, crc_of_run(msgen_format_i16, 11));
+    TEST_ASSERT_EQUAL_HEX32(0x888cbec3, crc_of_run(msgen_format_i32, 123));
+}
+
 static void test_player_init_refuses_impossible_settings(void)
 {
     struct msgen_player player;
@@ -357,6 +387,297 @@ static void test_player_init_refuses_impossible_settings(void)
     TEST_ASSERT_EQUAL_INT(core_err_player_format, msgen_player_init(&player, &table, &config));
 }
 
+/* A build whose position travels: the same samples behind a longer header. */
+static void build_travelling(enum msgen_format format, int64_t travel_q30)
+{
+    build(format, 17);
+    size_t data = 4 + (size_t)samples * channels * msgen_format_bytes(format);
+    memmove(bytes + msgen_header_travel_bytes, bytes + msgen_header_bytes, data);
+    table.travel_q30 = travel_q30;
+    TEST_ASSERT_EQUAL_INT(core_ok, msgen_table_encode_header(&table, bytes));
+    TEST_ASSERT_EQUAL_INT(core_ok, msgen_table_open(bytes, msgen_header_travel_bytes + data, &table));
+}
+
+static double travel_counts(void)
+{
+    return (double)table.travel_q30 / CORE_Q30_ONE;
+}
+
+/* Truncation: a unit of 2^-30 for each sample of a ramp. */
+static const double travel_rounding = (fade_in + fade_out) / 1073741824.0;
+
+static void check_travelling_run(void)
+{
+    struct msgen_player player;
+    struct msgen_player_config config = usual();
+    start(&player, &config);
+    double travelled = 0; /* the sum of the faded speed, in double */
+    double last_speed = 0;
+    for (unsigned s = 0; s < fade_in + periods * samples + fade_out + 10; s++) {
+        int32_t out[channels];
+        uint32_t index = (table.start_index + samples * 4u - fade_in + s) % samples;
+        msgen_player_step(&player, out);
+        travelled += last_speed;
+        last_speed = expected_factor(s) * travel_counts() / samples;
+        /* The factor of a ramp is off by 4 units of Q30, in each of its samples. */
+        double within = tolerance_of(2) + travel_rounding + fabs(travel_counts()) * 4 / 1073741824.0;
+        TEST_ASSERT_DOUBLE_WITHIN(within, expected_factor(s) * values[index][2] + travelled, out[2]);
+        TEST_ASSERT_DOUBLE_WITHIN(tolerance_of(0), expected_factor(s) * values[index][0], out[0]);
+        if (s == 0)
+            TEST_ASSERT_EACH_EQUAL_INT32(0, out, channels);
+        if (s + 1 >= fade_in + periods * samples + fade_out) {
+            TEST_ASSERT_EACH_EQUAL_INT32(0, out, 2); /* at rest where it has got to */
+            TEST_ASSERT_EQUAL_INT32((int32_t)rint((double)player.travel.position_q30 / CORE_Q30_ONE), out[2]);
+        }
+    }
+    /* Three whole periods and half of each ramp; the sums of s(t) over a ramp's samples are half of it within one. */
+    TEST_ASSERT_DOUBLE_WITHIN(1.0, periods + 0.5 * (fade_in + fade_out) / samples,
+                              (double)player.travel.position_q30 / (double)table.travel_q30);
+    TEST_ASSERT_EQUAL_UINT32(0, player.err.saturated);
+}
+
+static void test_player_travels_with_the_faded_speed(void)
+{
+    build_travelling(msgen_format_i16, (int64_t)(70000.3 * CORE_Q30_ONE));
+    check_travelling_run();
+    build_travelling(msgen_format_i16, (int64_t)(-0.77 * CORE_Q30_ONE));
+    check_travelling_run();
+}
+
+static void test_player_travel_of_a_period_is_exact_however_many(void)
+{
+    static const int64_t travels[] = {1, -99, 12345678901, -98765432109876};
+    for (unsigned i = 0; i < sizeof travels / sizeof travels[0]; i++) {
+        build_travelling(msgen_format_i16, travels[i]);
+        struct msgen_player player;
+        struct msgen_player_config config = {.periods = 1000, .abort_samples = 1};
+        start(&player, &config);
+        int32_t out[channels];
+        for (unsigned s = 0; s <= 1000 * samples; s++) {
+            msgen_player_step(&player, out);
+            if (s % samples == 0)
+                TEST_ASSERT_EQUAL_INT64((int64_t)(s / samples) * travels[i], player.travel.position_q30);
+        }
+        TEST_ASSERT_EQUAL_INT(msgen_phase_done, player.phase);
+        TEST_ASSERT_EACH_EQUAL_INT32(0, out, 2);
+    }
+}
+
+static void test_player_abort_at_every_sample_rests_where_it_is(void)
+{
+    build_travelling(msgen_format_i16, (int64_t)50000 * CORE_Q30_ONE);
+    for (unsigned abort_at = 1; abort_at < fade_in + periods * samples + fade_out + 2; abort_at++) {
+        struct msgen_player player;
+        struct msgen_player_config config = usual();
+        start(&player, &config);
+        int32_t out[channels], before = 0;
+        int64_t travelled = 0;
+        for (unsigned s = 0; s < fade_in + periods * samples + fade_out + 5; s++) {
+            if (s == abort_at)
+                msgen_player_abort(&player);
+            struct msgen_player_state state = msgen_player_step(&player, out);
+            TEST_ASSERT_TRUE(fabs((double)out[2] - before) <= step_bound(2, abort_ramp) + travel_counts() / samples);
+            TEST_ASSERT_TRUE(player.travel.position_q30 >= travelled); /* never back */
+            /* What the travel may still gain is the ramp's half at full speed. */
+            if (s >= abort_at && state.phase == msgen_phase_done)
+                TEST_ASSERT_EQUAL_INT32((int32_t)rint((double)player.travel.position_q30 / CORE_Q30_ONE), out[2]);
+            before = out[2];
+            travelled = player.travel.position_q30;
+        }
+        TEST_ASSERT_EQUAL_INT(msgen_phase_done, player.phase);
+        TEST_ASSERT_EACH_EQUAL_INT32(0, out, 2);
+    }
+}
+
+static void test_player_travel_turns_with_the_gain(void)
+{
+    build_travelling(msgen_format_i16, (int64_t)1000 * CORE_Q30_ONE);
+    struct msgen_player player;
+    struct msgen_player_config config = {.periods = 4, .abort_samples = 1};
+    config.gain_q16[2] = -2 * msgen_gain_one;
+    start(&player, &config);
+    int32_t out[channels];
+    for (unsigned s = 0; s <= 4 * samples; s++)
+        msgen_player_step(&player, out);
+    TEST_ASSERT_EQUAL_INT32(-8000, out[2]);
+}
+
+static void test_player_f32_travels_alike(void)
+{
+    static const double travel = 2.5;
+    build_travelling(msgen_format_f32, (int64_t)(travel * CORE_Q30_ONE));
+    struct msgen_player player;
+    struct msgen_player_config config = usual();
+    start(&player, &config);
+    double travelled = 0, last_speed = 0;
+    float out[channels];
+    for (unsigned s = 0; s < fade_in + periods * samples + fade_out + 5; s++) {
+        struct msgen_player_state state = msgen_player_step_f32(&player, out);
+        travelled += last_speed;
+        last_speed = expected_factor(s) * travel / samples;
+        double expected = expected_factor(s) * values[state.index][2] + travelled;
+        TEST_ASSERT_DOUBLE_WITHIN(3e-7 * (3 + travelled), expected, (double)out[2]); /* 24 bits */
+    }
+    TEST_ASSERT_TRUE(out[0] == 0 && out[1] == 0);
+    TEST_ASSERT_TRUE((double)out[2] > periods * travel);
+}
+
+static void test_player_refuses_travel_that_does_not_fit(void)
+{
+    struct msgen_player player;
+    struct msgen_player_config config = {.periods = 1000, .abort_samples = 1};
+    build_travelling(msgen_format_i16, (int64_t)2147000 * CORE_Q30_ONE);
+    TEST_ASSERT_EQUAL_INT(core_ok, msgen_player_init(&player, &table, &config));
+    config.gain_q16[2] = 2 * msgen_gain_one;
+    TEST_ASSERT_EQUAL_INT(core_err_player_travel, msgen_player_init(&player, &table, &config));
+    config.gain_q16[2] = 0;
+    config.limit[2] = 1000000000;
+    TEST_ASSERT_EQUAL_INT(core_err_player_travel, msgen_player_init(&player, &table, &config));
+    config.limit[2] = 0;
+    config.periods = 1001;
+    TEST_ASSERT_EQUAL_INT(core_err_player_travel, msgen_player_init(&player, &table, &config));
+    config.periods = UINT32_MAX;
+    config.fade_in_samples = config.fade_out_samples = msgen_ramp_samples_max;
+    TEST_ASSERT_EQUAL_INT(core_err_player_travel, msgen_player_init(&player, &table, &config));
+    build_travelling(msgen_format_i16, -((int64_t)1 << 61));
+    config = (struct msgen_player_config){.periods = 2, .abort_samples = 1};
+    TEST_ASSERT_EQUAL_INT(core_err_player_travel, msgen_player_init(&player, &table, &config));
+}
+
+enum { approach = 40, dwell = 25, lead = approach + dwell };
+
+static struct msgen_player_config with_approach(void)
+{
+    struct msgen_player_config config = usual();
+    config.fade_in_samples = 0;
+    config.approach_samples = approach;
+    config.dwell_samples = dwell;
+    return config;
+}
+
+static double approach_factor(unsigned sample)
+{
+    return sample < approach ? smooth((double)sample / approach) : 1;
+}
+
+/* One sample of either format, as numbers. */
+static struct msgen_player_state step_any(struct msgen_player *player, double *out)
+{
+    float real[channels];
+    int32_t counts[channels];
+    bool is_float = table.format == msgen_format_f32;
+    struct msgen_player_state state =
+        is_float ? msgen_player_step_f32(player, real) : msgen_player_step(player, counts);
+    for (unsigned c = 0; c < channels; c++)
+        out[c] = is_float ? (double)real[c] : (double)counts[c];
+    return state;
+}
+
+static void test_player_approaches_stands_and_begins_at_the_start(void)
+{
+    for (int format = msgen_format_i16; format <= msgen_format_f32; format++) {
+        build((enum msgen_format)format, 17);
+        struct msgen_player player;
+        struct msgen_player_config config = with_approach();
+        double out[channels];
+        start(&player, &config);
+        double within = format == msgen_format_f32 ? 3e-7 * 3 : tolerance_of(2);
+        for (unsigned s = 0; s < lead; s++) {
+            struct msgen_player_state state = step_any(&player, out);
+            TEST_ASSERT_EQUAL_INT(msgen_phase_approach, state.phase);
+            TEST_ASSERT_EQUAL_UINT32(17, state.index);
+            TEST_ASSERT_TRUE(out[0] == 0 && out[1] == 0);
+            TEST_ASSERT_DOUBLE_WITHIN(within, approach_factor(s) * values[17][2], out[2]);
+        }
+        TEST_ASSERT_TRUE(out[2] == values[17][2]);
+        for (unsigned s = 0; s < periods * samples; s++) {
+            struct msgen_player_state state = step_any(&player, out);
+            TEST_ASSERT_EQUAL_INT(msgen_phase_playing, state.phase);
+            TEST_ASSERT_EQUAL_UINT32(s / samples, state.period);
+            for (unsigned c = 0; c < channels; c++)
+                TEST_ASSERT_TRUE(out[c] == values[(17 + s) % samples][c]);
+        }
+        TEST_ASSERT_EQUAL_INT(msgen_phase_fade_out, step_any(&player, out).phase);
+    }
+}
+
+static void test_player_abort_of_an_approach_runs_back_without_a_jump(void)
+{
+    for (unsigned abort_at = 0; abort_at <= lead; abort_at++) {
+        struct msgen_player player;
+        struct msgen_player_config config = with_approach();
+        int32_t out[channels], before = 0;
+        start(&player, &config);
+        double bound = 1.5 * fabs(values[17][2]) / abort_ramp + 1;
+        for (unsigned s = 0; s <= abort_at + abort_ramp; s++) {
+            if (s == abort_at)
+                msgen_player_abort(&player);
+            msgen_player_step(&player, out);
+            TEST_ASSERT_EACH_EQUAL_INT32(0, out, 2);
+            TEST_ASSERT_TRUE(fabs((double)out[2] - before) <= bound);
+            before = out[2];
+        }
+        TEST_ASSERT_EQUAL_INT(msgen_phase_done, player.phase);
+        TEST_ASSERT_EQUAL_INT32(0, out[2]);
+    }
+}
+
+static void test_player_approach_sets_off_with_the_speed_of_travel(void)
+{
+    build_travelling(msgen_format_i16, (int64_t)(-20000.4 * CORE_Q30_ONE));
+    for (unsigned n = 0; n < samples; n++) /* -200 on top: what the mean has to find */
+        core_put_u16(bytes + msgen_header_travel_bytes + 4 + 2 * (channels * n + 1),
+                     (uint16_t)(int16_t)(values[n][1] - 200));
+    struct msgen_player player;
+    struct msgen_player_config config = with_approach();
+    start(&player, &config);
+    double travelled = 0, last_factor = 0;
+    for (unsigned s = 0; s < lead + samples; s++) {
+        int32_t out[channels];
+        double factor = approach_factor(s);
+        unsigned index = s < lead ? 17 : (17 + s - lead) % samples;
+        double velocity = s < lead ? factor * -200 : values[index][1] - 200;
+        msgen_player_step(&player, out);
+        travelled += last_factor * travel_counts() / samples;
+        last_factor = factor;
+        TEST_ASSERT_DOUBLE_WITHIN(1.5, velocity, out[1]); /* the mean in whole counts */
+        TEST_ASSERT_DOUBLE_WITHIN(tolerance_of(2) + travel_rounding, factor * values[index][2] + travelled, out[2]);
+        TEST_ASSERT_TRUE(out[0] == (s < lead ? 0 : (int32_t)values[index][0]));
+    }
+}
+
+static void test_player_f32_approach_sets_off_with_the_speed_of_travel(void)
+{
+    build_travelling(msgen_format_f32, (int64_t)(2.5 * CORE_Q30_ONE));
+    struct msgen_player player;
+    struct msgen_player_config config = with_approach();
+    float out[channels];
+    start(&player, &config);
+    for (unsigned s = 0; s < lead; s++) {
+        msgen_player_step_f32(&player, out);
+        /* 2.5 in 100 samples at 1 kHz, both scales 1; 24 bits of it */
+        TEST_ASSERT_DOUBLE_WITHIN(25 * 3e-7, 25 * approach_factor(s), (double)out[1]);
+    }
+}
+
+static void test_player_refuses_an_approach_that_is_none(void)
+{
+    struct msgen_player player;
+    struct msgen_player_config config = with_approach();
+    config.fade_in_samples = 1;
+    TEST_ASSERT_EQUAL_INT(core_err_player_fade, msgen_player_init(&player, &table, &config));
+    config = with_approach();
+    config.approach_samples = msgen_ramp_samples_max + 1;
+    TEST_ASSERT_EQUAL_INT(core_err_player_fade, msgen_player_init(&player, &table, &config));
+    config = with_approach();
+    config.dwell_samples = msgen_ramp_samples_max + 1;
+    TEST_ASSERT_EQUAL_INT(core_err_player_fade, msgen_player_init(&player, &table, &config));
+    build_travelling(msgen_format_i16, (int64_t)2147000 * CORE_Q30_ONE);
+    config = (struct msgen_player_config){.periods = 1000, .abort_samples = 1, .approach_samples = 1};
+    config.dwell_samples = 2 * samples; /* a thousand periods fit without it */
+    TEST_ASSERT_EQUAL_INT(core_err_player_travel, msgen_player_init(&player, &table, &config));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -372,5 +693,17 @@ int main(void)
     RUN_TEST(test_player_f32_plays_the_same_curve);
     RUN_TEST(test_player_puts_out_zero_for_the_other_format);
     RUN_TEST(test_player_init_refuses_impossible_settings);
+    RUN_TEST(test_player_without_travel_puts_out_the_same_bits_as_ever);
+    RUN_TEST(test_player_travels_with_the_faded_speed);
+    RUN_TEST(test_player_travel_of_a_period_is_exact_however_many);
+    RUN_TEST(test_player_abort_at_every_sample_rests_where_it_is);
+    RUN_TEST(test_player_travel_turns_with_the_gain);
+    RUN_TEST(test_player_f32_travels_alike);
+    RUN_TEST(test_player_refuses_travel_that_does_not_fit);
+    RUN_TEST(test_player_approaches_stands_and_begins_at_the_start);
+    RUN_TEST(test_player_abort_of_an_approach_runs_back_without_a_jump);
+    RUN_TEST(test_player_approach_sets_off_with_the_speed_of_travel);
+    RUN_TEST(test_player_f32_approach_sets_off_with_the_speed_of_travel);
+    RUN_TEST(test_player_refuses_an_approach_that_is_none);
     return UNITY_END();
 }

@@ -148,7 +148,7 @@ static void test_table_refuses_each_field_out_of_range(void)
 {
     expect_byte(0, 'm', core_err_table_magic);
     expect_byte(4, 0, core_err_table_version);
-    expect_byte(4, 2, core_err_table_version);
+    expect_byte(4, 3, core_err_table_version);
     expect_byte(6, 0, core_err_table_channels);
     expect_byte(6, 4, core_err_table_channels);
     expect_byte(7, 0, core_err_table_format);
@@ -277,6 +277,98 @@ static void test_table_encoder_leaves_the_bytes_alone_on_error(void)
     TEST_ASSERT_EQUAL_HEX8(0xA5, bytes[msgen_header_bytes]);
 }
 
+/* The same table with travel: 8 more bytes of header, the rest moved. */
+static size_t build_travelling(int64_t travel_q30)
+{
+    size_t size = build(msgen_format_i16);
+    memmove(bytes + msgen_header_travel_bytes, bytes + msgen_header_bytes, size - msgen_header_bytes);
+    table.travel_q30 = travel_q30;
+    TEST_ASSERT_EQUAL_UINT32(msgen_header_travel_bytes, msgen_table_header_bytes(&table));
+    TEST_ASSERT_EQUAL_INT(core_ok, msgen_table_encode_header(&table, bytes));
+    return msgen_header_travel_bytes + data_size();
+}
+
+static void sign_travelling(void)
+{
+    core_put_u32(bytes + 60, core_crc32(0, bytes, 60));
+}
+
+static void test_table_with_travel_reads_back(void)
+{
+    static const int64_t travels[] = {1, -1, 123456789012345, -((int64_t)1 << 61), (int64_t)1 << 61, -4294967296};
+    for (unsigned i = 0; i < sizeof travels / sizeof travels[0]; i++) {
+        struct msgen_table view;
+        size_t size = build_travelling(travels[i]);
+        TEST_ASSERT_EQUAL_UINT32(2, core_get_u16(bytes + 4));
+        TEST_ASSERT_EQUAL_INT(core_ok, msgen_table_open(bytes, size, &view));
+        TEST_ASSERT_EQUAL_INT64(travels[i], view.travel_q30);
+        TEST_ASSERT_EQUAL_HEX32(core_crc32(0, bytes, 60), view.header_crc32);
+        TEST_ASSERT_EQUAL_UINT32(bins[2], msgen_table_bin(&view, 2));
+        TEST_ASSERT_EQUAL_INT32(-32768 + 59 * 1110, msgen_table_count(&view, 19, 2));
+    }
+}
+
+static void test_table_without_travel_is_version_1_as_ever(void)
+{
+    struct msgen_table view;
+    size_t size = build(msgen_format_i16);
+    TEST_ASSERT_EQUAL_UINT32(1, core_get_u16(bytes + 4));
+    TEST_ASSERT_EQUAL_UINT32(msgen_header_bytes, msgen_table_header_bytes(&table));
+    TEST_ASSERT_EQUAL_INT(core_ok, msgen_table_open(bytes, size, &view));
+    TEST_ASSERT_EQUAL_INT64(0, view.travel_q30);
+    /* What the encoder of the first version wrote for this table. */
+    TEST_ASSERT_EQUAL_HEX32(0xbe5391f6, view.header_crc32);
+}
+
+static void test_table_refuses_travel_out_of_range(void)
+{
+    static const uint32_t out_of_range[][2] = {
+        {0, 0},          /* none: that is version 1 */
+        {1, 0x20000000}, /* 2^61 + 1 */
+        {0, 0x80000000}, /* -2^63 */
+    };
+    struct msgen_table view;
+    for (unsigned i = 0; i < sizeof out_of_range / sizeof out_of_range[0]; i++) {
+        size_t size = build_travelling(77);
+        core_put_u32(bytes + 52, out_of_range[i][0]);
+        core_put_u32(bytes + 56, out_of_range[i][1]);
+        sign_travelling();
+        TEST_ASSERT_EQUAL_INT(core_err_table_travel, msgen_table_open(bytes, size, &view));
+        TEST_ASSERT_EQUAL_UINT32(52, view.fault_offset);
+    }
+    fill_table(msgen_format_i16);
+    table.travel_q30 = 77;
+    table.channels = 2; /* no position to travel */
+    table.scale_bits[2] = 0;
+    TEST_ASSERT_EQUAL_INT(core_err_table_travel, msgen_table_encode_header(&table, bytes));
+}
+
+static void test_table_with_travel_refuses_every_truncation_and_changed_byte(void)
+{
+    struct msgen_table view;
+    size_t size = build_travelling(-77);
+    for (size_t shorter = 0; shorter < size; shorter++) {
+        uint8_t *cut = malloc(shorter ? shorter : 1);
+        TEST_ASSERT_NOT_NULL(cut);
+        memcpy(cut, bytes, shorter);
+        TEST_ASSERT_EQUAL_INT(core_err_table_truncated, msgen_table_open(cut, shorter, &view));
+        free(cut);
+    }
+    TEST_ASSERT_EQUAL_INT(core_err_table_trailing, msgen_table_open(bytes, size + 1, &view));
+    for (size_t at = 0; at < size; at++) {
+        for (unsigned change = 1; change < 256; change++) {
+            bytes[at] ^= (uint8_t)change;
+            TEST_ASSERT_NOT_EQUAL(core_ok, msgen_table_open(bytes, size, &view));
+            bytes[at] ^= (uint8_t)change;
+        }
+    }
+    core_put_u32(bytes + 64, 0);
+    core_put_u32(bytes + 48, core_crc32(0, bytes + 64, size - 64));
+    sign_travelling();
+    TEST_ASSERT_EQUAL_INT(core_err_table_bin_order, msgen_table_open(bytes, size, &view));
+    TEST_ASSERT_EQUAL_UINT32(64, view.fault_offset);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -293,5 +385,9 @@ int main(void)
     RUN_TEST(test_table_refuses_every_changed_byte);
     RUN_TEST(test_table_names_the_crc_that_is_wrong);
     RUN_TEST(test_table_encoder_leaves_the_bytes_alone_on_error);
+    RUN_TEST(test_table_with_travel_reads_back);
+    RUN_TEST(test_table_without_travel_is_version_1_as_ever);
+    RUN_TEST(test_table_refuses_travel_out_of_range);
+    RUN_TEST(test_table_with_travel_refuses_every_truncation_and_changed_byte);
     return UNITY_END();
 }
