@@ -6,9 +6,11 @@ set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 
 find_package(ZLIB REQUIRED)
+find_package(Threads REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(CJSON REQUIRED IMPORTED_TARGET libcjson)
 pkg_check_modules(LAPACKE REQUIRED IMPORTED_TARGET lapacke)
+pkg_check_modules(OPENBLAS REQUIRED IMPORTED_TARGET openblas)
 
 servoscope_room(drivers drivers LINKS servoscope_lib)
 servoscope_room(can drivers/can LINKS servoscope_drivers servoscope_lib)
@@ -22,11 +24,28 @@ servoscope_room(sim sim EXTRA ${effect_files} ${PROJECT_BINARY_DIR}/generated/ef
 servoscope_room(node sim/node LINKS servoscope_sim servoscope_can servoscope_modbus servoscope_lib)
 
 servoscope_room(page lab/page LINKS m)
-servoscope_room(numeric lab/numeric EXTRA ${PROJECT_SOURCE_DIR}/lab/numeric/fft.cpp LINKS PkgConfig::LAPACKE m)
-servoscope_room(record lab/record LINKS servoscope_sim servoscope_lib servoscope_page PkgConfig::CJSON ZLIB::ZLIB m)
+servoscope_room(numeric lab/numeric EXTRA ${PROJECT_SOURCE_DIR}/lab/numeric/fft.cpp
+  ${PROJECT_SOURCE_DIR}/lab/numeric/fft_portable.cpp ${PROJECT_SOURCE_DIR}/lab/numeric/fft_avx2.cpp
+  LINKS PkgConfig::LAPACKE PkgConfig::OPENBLAS m)
+# The innermost loops of a transform are nine tenths of every design's time, and twenty times slower without inlining and
+# with every access checked; tests/unit/test_fft.c guards the borders of their buffers.
+set_source_files_properties(lab/numeric/fft_portable.cpp lab/numeric/fft_avx2.cpp
+  PROPERTIES COMPILE_OPTIONS "-O2;-fno-sanitize=all")
+
+file(GLOB format_files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/lab/record/format_*.c)
+servoscope_registry(${PROJECT_BINARY_DIR}/generated/formats.c "struct record_format" record_ record_formats
+  "lab/record/format.h" ${format_files})
+include(cmake/matio.cmake)
+servoscope_room(record lab/record EXTRA ${PROJECT_BINARY_DIR}/generated/formats.c ${matio_files}
+  LINKS servoscope_sim servoscope_lib servoscope_page PkgConfig::CJSON ZLIB::ZLIB m ${CMAKE_DL_LIBS})
+if(matio_library)
+  target_include_directories(servoscope_record SYSTEM PRIVATE ${MATIO_INCLUDE_DIRS})
+  target_compile_definitions(servoscope_record PRIVATE SERVOSCOPE_MATIO_LIBRARY="${matio_library}")
+endif()
 servoscope_room(measure lab/measure LINKS servoscope_record servoscope_drivers servoscope_lib servoscope_page)
 servoscope_room(estimate lab/estimate LINKS servoscope_numeric servoscope_record servoscope_page)
-servoscope_room(design lab/design LINKS servoscope_numeric servoscope_record servoscope_sim servoscope_page)
+servoscope_room(design lab/design
+  LINKS servoscope_numeric servoscope_record servoscope_sim servoscope_page Threads::Threads)
 servoscope_room(diagnose lab/diagnose
   LINKS servoscope_sim servoscope_estimate servoscope_numeric servoscope_record servoscope_page)
 servoscope_room(experiment lab/experiment LINKS servoscope_design servoscope_diagnose servoscope_numeric servoscope_page)

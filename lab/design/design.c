@@ -2,7 +2,7 @@
 #include "lab/design/design.h"
 
 #include "lab/design/method.h"
-#include "lab/design/start_phase.h"
+#include "lab/design/start.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -15,6 +15,7 @@ enum {
 };
 
 static const double pi = 3.14159265358979323846;
+static const double tolerance_max_db = 20; ///< more than a factor of 100 between lines is no design any more
 
 static int check_positive(const char *what, double value, bool may_be_absent, struct error *out_error)
 {
@@ -42,6 +43,16 @@ static int check_limits(const struct design_request *request, struct error *out_
                          "no limit is given, expected at least one of position, velocity, acceleration, torque");
     }
     return 0;
+}
+
+static int check_search(const struct design_request *request, struct error *out_error)
+{
+    const double tolerance_db = request->amplitude_tolerance_db;
+    if (!(tolerance_db >= 0 && tolerance_db <= tolerance_max_db)) {
+        return error_set(out_error, error_usage, "amplitude tolerance: %g dB, expected 0 to %g", tolerance_db,
+                         tolerance_max_db);
+    }
+    return check_positive("time budget", request->time_budget_s, true, out_error);
 }
 
 static int check_lines(const struct design_request *request, struct error *out_error)
@@ -233,30 +244,58 @@ static void fill_result(const struct design_request *request, const struct desig
     result->crest_factor =
         (at_samples ? result->peak.torque_Nm : result->peak_continuous.torque_Nm) / result->effective_torque_Nm;
     result->bound_Nm = torque_rms * design_spectrum_scale_bound(spectrum, at_samples ? request->period_samples : 0);
-    if (request->start == design_start_paper) {
-        result->start_index = design_start_phase_paper(request->period_samples, result->velocity_rad_per_s,
-                                                       result->acceleration_rad_per_s2);
-    }
 }
 
+/// Of this thread: others of the program are not the optimiser's.
 static double cpu_seconds(void)
 {
     struct timespec now = {0};
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
+/// Makes the amplitudes that were found the prescribed ones. Rounding is not to leave the tolerance.
+static void take_amplitudes(const struct design_search *search, double tolerance_db, struct design_spectrum *spectrum)
+{
+    const double longest = pow(10, tolerance_db / 20);
+    for (size_t k = 0; k < spectrum->line_count; k++) {
+        double *c = &search->best[2 * k];
+        double length = hypot(c[0], c[1]);
+        spectrum->amplitude_rad[k] *= fmax(1 / longest, fmin(length, longest));
+        c[0] /= length;
+        c[1] /= length;
+    }
+}
+
+static int run_method(const struct design_request *request, const struct design_method *method,
+                      struct design_search *search, struct design_result *result, struct error *out_error)
+{
+    const volatile sig_atomic_t *stop = request->stop_requested;
+    struct design_watch watch;
+    design_watch_begin(request, request->inertia_kgm2 * design_spectrum_rms(search->spectrum, design_acceleration),
+                       &watch);
+    search->watch = &watch;
+    const double begun_s = cpu_seconds();
+    int status = method->run(request, search, out_error);
+    result->cpu_s = cpu_seconds() - begun_s + watch.cpu_s;
+    result->starts = watch.starts;
+    result->interrupted = stop && *stop;
+    search->watch = NULL;
+    return status;
+}
+
 static int optimise(const struct design_request *request, const struct design_method *method,
-                    const struct design_spectrum *spectrum, struct design_result *result, struct error *out_error)
+                    struct design_spectrum *spectrum, struct design_result *result, struct error *out_error)
 {
     struct design_search search;
     struct fine_scan scan;
     if (!design_search_create(request, spectrum, &search)) {
         return design_method_out_of_memory(out_error);
     }
-    const double begun_s = cpu_seconds();
-    int status = method->run(request, &search, out_error);
-    result->cpu_s = cpu_seconds() - begun_s;
+    int status = run_method(request, method, &search, result, out_error);
+    if (!status && request->amplitude_tolerance_db > 0) {
+        take_amplitudes(&search, request->amplitude_tolerance_db, spectrum);
+    }
     if (!status && !fine_scan_create(request, spectrum, &scan)) {
         status = design_method_out_of_memory(out_error);
     }
@@ -264,6 +303,7 @@ static int optimise(const struct design_request *request, const struct design_me
         fine_scan_run(&scan, search.best);
         fill_result(request, spectrum, &search, &scan, result);
         fine_scan_free(&scan);
+        status = design_start_apply(request, result, out_error);
     }
     design_search_free(&search);
     return status;
@@ -274,6 +314,7 @@ int design_run(const struct design_request *request, struct design_result *out_r
     *out_result = (struct design_result){0};
     int status = check_lines(request, out_error);
     status = status ? status : check_limits(request, out_error);
+    status = status ? status : check_search(request, out_error);
     const struct design_method *method = find_method(request->method);
     if (!status && !method) {
         status = refuse_method(request->method, out_error);

@@ -59,7 +59,8 @@ struct design_request {
     bool linear;
     /// Torque amplitudes of the lines relative to each other (bin_count numbers > 0); NULL: by the limits (spectrum.h).
     const double *torque_shape;
-    /// > 0, for "fast": each amplitude may differ from the prescribed ratio by this much, up or down.
+    /// 0 .. 20, for "fast": each amplitude may differ from the prescribed ratio by this much, up or down, and a common
+    /// factor.
     double amplitude_tolerance_db;
     const char *method;    ///< a name from design_methods[]; NULL: "fast"
     enum design_keep keep; ///< for "clip"
@@ -68,7 +69,7 @@ struct design_request {
     size_t iterations;                   ///< 0: the method's own
     const struct sim_model *start_model; ///< with design_start_model
     bool torque_mode;                    ///< the table will drive the torque alone (open loop), not the cascade
-    size_t starts;        ///< of "fast": 1 is the deterministic start alone, more add seeded ones; 0: its own
+    size_t starts; ///< of "fast": 1 is the deterministic start alone, more add seeded ones; 0: by the problem's size
     double time_budget_s; ///< > 0, of "fast": further seeded starts until so much wall-clock time has gone
     size_t threads;       ///< 0: as many as there are processors
     uint64_t seed;
@@ -100,13 +101,17 @@ struct design_result {
     double *velocity_rad_per_s;
     double *acceleration_rad_per_s2;
     size_t start_index;
-    struct design_peaks peak;            ///< at the samples
+    /// Energy of the motor's velocity that is start transient in the first period, as a share of the steady state's,
+    /// for a drive that begins at rest (start_phase.h); below 0: not known.
+    double expected_transient;
+    double travel_per_period_rad; ///< what the position gains beside its series; 0 without a bias velocity (offset.h)
+    struct design_peaks peak;     ///< at the samples
     struct design_peaks peak_continuous; ///< on at least 16 times as many points
     double effective_torque_Nm;
     double effective_torque_continuous_Nm; ///< the same scaled down until the limits hold between the samples too
     double crest_factor;                   ///< torque peak (where the grid asks for it) over effective torque
-    double bound_Nm;  ///< no phases give more at these amplitude ratios on this grid (docs/theory.md)
-    double cpu_s;     ///< processor time of the optimiser, all threads added
+    double bound_Nm;  ///< no phases give more at the amplitude ratios of this result on this grid (docs/theory.md)
+    double cpu_s;     ///< processor time of the method, all threads added
     size_t starts;    ///< of "fast": how many were finished
     bool interrupted; ///< stop_requested was seen before the method was through
 };

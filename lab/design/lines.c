@@ -82,6 +82,7 @@ static int last_bin(const struct parse *self, uint32_t *out_bin)
 
 static int allocate(const struct parse *self)
 {
+    self->lines->step_bins = 1;
     self->lines->bins = calloc(self->grid->period_samples / 2 + 1, sizeof *self->lines->bins);
     return self->lines->bins ? 0 : error_set(self->out_error, error_refused, "memory is short for the lines");
 }
@@ -102,6 +103,7 @@ static int parse_linear(const struct parse *self)
     for (uint32_t bin = first; !status && bin <= last; bin += step) {
         append(self, bin);
     }
+    self->lines->step_bins = step;
     return status;
 }
 
@@ -117,6 +119,7 @@ static int parse_odd(const struct parse *self)
             append(self, bin);
         }
     }
+    self->lines->step_bins = step;
     return status;
 }
 
@@ -236,6 +239,8 @@ static const struct {
     {"odd", "odd:FMIN:FMAX:STEP", parse_odd},
     {"random-odd", "random-odd:FMIN:FMAX:STEP", parse_random_odd},
     {"quasilog", "quasilog:FMIN:FMAX:RATIO", parse_quasilog},
+    {"octaves", "octaves:FMIN:FMAX:STEP", parse_linear},
+    {"dwell", "dwell:FMIN:FMAX:STEP", parse_linear},
 };
 
 static int parse_numbers(struct parse *self, const char *text, const char *form)
@@ -275,12 +280,9 @@ static int parse_kind(struct parse *self)
             return status ? status : kinds[i].parse(self);
         }
     }
-    if (strncmp(self->specification, "octaves:", 8) == 0 || strncmp(self->specification, "dwell:", 6) == 0) {
-        return error_set(self->out_error, error_usage,
-                         "%s: octaves and dwell make sequences of tables, which are not available yet", self->place);
-    }
     return error_set(self->out_error, error_usage,
-                     "%s: expected linear:, odd: or random-odd:FMIN:FMAX:STEP, quasilog:FMIN:FMAX:RATIO or list:FILE",
+                     "%s: expected linear:, odd:, random-odd:, octaves: or dwell:FMIN:FMAX:STEP, "
+                     "quasilog:FMIN:FMAX:RATIO or list:FILE",
                      self->place);
 }
 

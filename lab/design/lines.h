@@ -8,6 +8,8 @@
 ///                                out show odd-order distortion
 ///     quasilog:FMIN:FMAX:RATIO   greedy: the next bin is max(b + 1, round(RATIO b))
 ///     list:FILE                  one frequency in Hz per line, any order, `#` begins a comment
+///     octaves:FMIN:FMAX:STEP     the lines of linear:, which a sequence plays one octave after the other (sequence.h)
+///     dwell:FMIN:FMAX:STEP       the same, one line after the other
 ///
 /// Frequencies have to lie on the period's grid of rate / period within 1e-6 of themselves (and a hundredth of a bin).
 #ifndef SERVOSCOPE_DESIGN_LINES_H
@@ -20,7 +22,8 @@
 
 struct design_lines {
     size_t count;
-    uint32_t *bins; ///< ascending, 1 .. (period - 1) / 2; owned
+    uint32_t *bins;     ///< ascending, 1 .. (period - 1) / 2; owned
+    uint32_t step_bins; ///< STEP; 1 for kinds that have none
 };
 
 /// The grid that lines have to lie on.

@@ -20,7 +20,8 @@ static int clip(const struct design_request *request, struct design_search *sear
     const size_t iterations = design_method_iterations(request, &design_method_clip);
     const size_t lines = search->spectrum->line_count;
     design_phases_newman(lines, c);
-    for (size_t i = 0; i <= iterations; i++) {
+    design_search_plan(search, iterations);
+    for (size_t i = 0; i <= iterations && (i == 0 || design_search_goes_on(search)); i++) {
         design_waveform_synthesise(acceleration, c, packed);
         double peak = design_waveform_peak(acceleration, packed, 0);
         design_search_offer(search, c, request->keep == design_keep_all ? score_all(search, c) : peak);

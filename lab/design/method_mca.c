@@ -5,6 +5,7 @@
 #include "lab/design/phases.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 /// Evaluates c, offers it, and returns the most critical signal; *out_peak in units of its limit.
 static size_t find_critical(struct design_search *search, const double *c, double *out_peak)
@@ -24,7 +25,8 @@ static size_t find_critical(struct design_search *search, const double *c, doubl
     return critical;
 }
 
-static int run(const struct design_request *request, struct design_search *search, struct error *out_error)
+int design_method_mca_run(const struct design_request *request, struct design_search *search,
+                          size_t out_clipped[design_signal_count], struct error *out_error)
 {
     const size_t iterations = design_method_iterations(request, &design_method_mca);
     const size_t lines = search->spectrum->line_count;
@@ -32,16 +34,25 @@ static int run(const struct design_request *request, struct design_search *searc
     if (!c) {
         return design_method_out_of_memory(out_error);
     }
+    memset(out_clipped, 0, design_signal_count * sizeof *out_clipped);
     design_phases_newman(lines, c);
     double peak = 0;
     size_t critical = find_critical(search, c, &peak);
-    for (size_t i = 0; i < iterations; i++) {
+    design_search_plan(search, iterations);
+    for (size_t i = 0; i < iterations && design_search_goes_on(search); i++) {
         double level = design_clipping_factor(i, iterations) * peak;
+        out_clipped[search->waveform.signals[critical]]++;
         design_clipping_step(&search->waveform, critical, level, search->packed, &c[2 * lines], c);
         critical = find_critical(search, c, &peak);
     }
     free(c);
     return 0;
+}
+
+static int run(const struct design_request *request, struct design_search *search, struct error *out_error)
+{
+    size_t clipped[design_signal_count];
+    return design_method_mca_run(request, search, clipped, out_error);
 }
 
 const struct design_method design_method_mca = {

@@ -2,13 +2,8 @@
 #include "lab/design/method.h"
 
 const struct design_method *const design_methods[] = {
-    &design_method_fast,
-    &design_method_mca,
-    &design_method_clip,
-    &design_method_newman,
-    &design_method_schroeder,
-    &design_method_random,
-    NULL,
+    &design_method_fast,   &design_method_mca,       &design_method_linf,   &design_method_clip,
+    &design_method_newman, &design_method_schroeder, &design_method_random, NULL,
 };
 
 size_t design_method_iterations(const struct design_request *request, const struct design_method *method)

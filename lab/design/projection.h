@@ -8,7 +8,9 @@
 
 /// Improves phases and offers every iterate to the search.
 /// Equation:  p = clip(x, t);  c = directions of G'(2 p - x);  u = G c;  x <- beta (x + u - p) + (1 - beta) p
-///            with beta = 0.9, t = (0.75 + 0.25 i / iterations) times the smallest peak of this call so far.
+///            with beta = 0.82, t = (0.68 + 0.32 i / iterations) times the smallest peak of this call so far.
+///            With a tolerance the lengths |c_k| are those of the least-squares fit to 2 p - x, brought to unit power
+///            and then within the tolerance.
 /// Shapes:    inout_c: 2 line_count doubles; on return the best of this call.
 /// Cost:      two transforms of each pair of signals per iteration.
 /// Returns false if memory is short.

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/design/report.h"
 
+#include "lab/design/intermodulation.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -65,6 +67,22 @@ static void add_panel(struct figure *figure, const struct row *row, size_t count
     }
 }
 
+/// Why a period begins where it does, to go behind "from sample N on".
+static const char *start_reason(enum design_start start)
+{
+    switch (start) {
+    case design_start_paper:
+        return ": the zero crossing of the velocity with the least acceleration, because the axis begins at rest";
+    case design_start_bank:
+        return ": where a bank of nominal drives, at rest before, has the least transient";
+    case design_start_model:
+        return ": where the drive of the given model, at rest before, has the least transient";
+    case design_start_none:
+        break;
+    }
+    return "";
+}
+
 /// One period in the order of playing, closed by its first sample: `values` holds (row_count + 1) x (N + 1) numbers.
 static void add_period(struct page *page, const struct design_request *request, const struct design_result *result,
                        const struct row *rows, double *values)
@@ -86,11 +104,8 @@ static void add_period(struct page *page, const struct design_request *request, 
             add_panel(&figure, &rows[i], points, values, values + (i + 1) * points);
         }
     }
-    page_add_figure(
-        page, &figure, "One period as it is played, from sample %zu of the table on%s.", result->start_index,
-        request->start == design_start_paper
-            ? ": the zero crossing of the velocity with the least acceleration, because the axis begins at rest"
-            : "");
+    page_add_figure(page, &figure, "One period as it is played, from sample %zu of the table on%s.",
+                    result->start_index, start_reason(request->start));
 }
 
 static void add_spectrum(struct page *page, const struct design_request *request, const struct design_result *result,
@@ -117,10 +132,10 @@ static void add_spectrum(struct page *page, const struct design_request *request
     panel->height = 110;
     panel->from_zero = true;
     figure_add_stems(panel, "velocity", count, frequency_hz, velocity)->colour = figure_vermilion;
-    page_add_figure(page, &figure,
-                    "Amplitudes of the %zu lines. They follow from the limits: a line gets what it may have where its "
-                    "tightest limit binds.",
-                    count);
+    page_add_figure(page, &figure, "Amplitudes of the %zu lines%s", count,
+                    request->torque_shape ? ", in the ratios that were asked for."
+                                          : ". They follow from the limits: a line gets what it may have where its "
+                                            "tightest limit binds.");
 }
 
 static void add_table(struct page *page, const struct row *rows)
@@ -162,7 +177,24 @@ static void add_pairs(struct page *page, const struct design_request *request, c
     page_add_pair(page, "bound", "%.4f %s, reached: %.0f %%; no phases give more", result->bound_Nm, unit,
                   100 * result->effective_torque_Nm / result->bound_Nm);
     page_add_pair(page, "start", "sample %zu", result->start_index);
+    if (result->expected_transient >= 0) {
+        page_add_pair(page, "start transient", "%.2g %% of the motion's energy in the first period (%s)",
+                      100 * result->expected_transient,
+                      request->start == design_start_model ? "of the model given"
+                                                           : "expected: mean over a bank of nominal drives");
+    }
     page_end_pairs(page);
+}
+
+static void add_products(struct page *page, const struct design_result *result)
+{
+    struct design_intermodulation counts;
+    char text[512];
+    if (design_intermodulation_count(result->bin_count, result->bins, &counts)) {
+        design_intermodulation_describe(&counts, text, sizeof text);
+        page_add_paragraph(page, "%s", text);
+        design_intermodulation_free(&counts);
+    }
 }
 
 void design_report_section(struct page *page, const struct design_request *request, const struct design_result *result)
@@ -188,5 +220,6 @@ void design_report_section(struct page *page, const struct design_request *reque
     }
     add_table(page, rows);
     add_pairs(page, request, result, line_hz, rows);
+    add_products(page, result);
     free(values);
 }

@@ -1,7 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /// From phases to signals on a grid and back: the two transforms that every method lives on.
-/// Signals are real, so two of them share one complex FFT: a "packed" buffer is pair after pair of `grid` complex
-/// numbers, the even signal in the real parts, the odd one in the imaginary parts (zero if there is none).
+/// Signals are real, so two series share one complex FFT. With fold D every signal is D interleaved series, every D-th
+/// point from point r on, each of grid / D points: transforms of that length are cheaper where most lines are empty,
+/// and one signal alone can fill real and imaginary parts too.
+/// A "packed" buffer is pair after pair of grid / D complex numbers: series i = r signal_count + s lies in pair i / 2,
+/// in the real parts if i is even, in the imaginary ones if it is odd (zero if there is none). With fold 1, which is
+/// what design_waveform_create() makes, the series are the signals.
 #ifndef SERVOSCOPE_DESIGN_WAVEFORM_H
 #define SERVOSCOPE_DESIGN_WAVEFORM_H
 
@@ -13,12 +17,18 @@ struct design_waveform {
     size_t line_count;
     const uint32_t *bins;
     size_t grid;         ///< points per period, > 2 times the highest bin
+    size_t fold;         ///< divides grid
+    size_t length;       ///< grid / fold
     size_t signal_count; ///< 1 .. 3
     enum design_signal signals[design_signal_count];
     double *gain[design_signal_count]; ///< per signal: line_count amplitudes, > 0
-    size_t packed_length;              ///< doubles of a packed buffer
+    size_t pair_count;
+    size_t packed_length; ///< doubles of a packed buffer
     struct fft_plan *plan;
-    double *spectrum; ///< 2 grid doubles of scratch
+    double *factor; ///< per series 2 line_count doubles: gain / 2, quarter turns of the order, turn to the first point
+    uint32_t *up;   ///< line_count: 2 times the index of bin b in a transform
+    uint32_t *down; ///< line_count: of bin -b
+    double *spectrum; ///< 2 length doubles of scratch
 };
 
 /// Which signals a waveform carries.
@@ -32,6 +42,9 @@ enum design_waveform_kind {
 /// out of design_waveform_limited. Returns false if memory is short (nothing is held then).
 bool design_waveform_create(const struct design_spectrum *spectrum, enum design_waveform_kind kind, size_t grid,
                             struct design_waveform *out_waveform);
+/// The same in `fold` interleaved series; fold must divide grid, 0: what is fastest.
+bool design_waveform_create_folded(const struct design_spectrum *spectrum, enum design_waveform_kind kind, size_t grid,
+                                   size_t fold, struct design_waveform *out_waveform);
 void design_waveform_free(struct design_waveform *self);
 
 /// u_s[n] = Re sum_k G_sk j^order(s) c_k exp(j 2 pi b_k n / grid), c: line_count complex numbers; out: packed.
@@ -40,6 +53,11 @@ void design_waveform_synthesise(const struct design_waveform *self, const double
 /// The adjoint: y_k = sum_s conj(G_sk j^order(s)) sum_n x_s[n] exp(-j 2 pi b_k n / grid); out: line_count complex
 /// numbers.
 void design_waveform_gather(const struct design_waveform *self, const double *packed, double *out_y);
+
+/// X_s[b] = sum_n x_s[n] exp(-j 2 pi b n / grid), b = 0 .. bin_count - 1, of each signal, one after the other.
+/// Shapes: out: signal_count x bin_count complex numbers
+void design_waveform_transform(const struct design_waveform *self, const double *packed, size_t bin_count,
+                               double *out_transform);
 
 /// Largest absolute value of one signal (index into signals[]) of a packed buffer.
 double design_waveform_peak(const struct design_waveform *self, const double *packed, size_t signal);

@@ -167,17 +167,29 @@ static void test_testbed_modified_clipping(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.001, 0.6934, judge_samples("--grid samples --method mca"));
 }
 
+/// Good local optima, wherever they are started from, lie in this band; the reference implementation's is 0.7225.
+static void test_testbed_linf(void)
+{
+    double effective_Nm = judge_samples("--grid samples --method linf");
+    TEST_ASSERT_TRUE(effective_Nm >= 0.718);
+    TEST_ASSERT_TRUE(effective_Nm <= 0.727);
+}
+
 static void test_testbed_newman_phases(void)
 {
     TEST_ASSERT_DOUBLE_WITHIN(0.0005, 0.5692, judge_samples("--grid samples --method newman"));
 }
 
-/// One start without randomness; the band of local optima is 0.718 .. 0.727.
+/// One start without randomness; the band of local optima is 0.718 .. 0.730.
+static void test_testbed_fast_single_start(void)
+{
+    TEST_ASSERT_TRUE(judge_samples("--grid samples --method fast --starts 1") >= 0.7195);
+}
+
+/// The best of its own number of starts; 130 seeds lay in 0.7254 .. 0.7302.
 static void test_testbed_fast(void)
 {
-    double effective_Nm = judge_samples("--grid samples --method fast");
-    TEST_ASSERT_TRUE(effective_Nm >= 0.7195);
-    TEST_ASSERT_TRUE(effective_Nm <= 0.727);
+    TEST_ASSERT_TRUE(judge_samples("--grid samples --method fast") >= 0.7235);
 }
 
 /// The default holds the limits at every instant: looked at here on 16 points per sample, from the CSV's spectrum.
@@ -197,7 +209,7 @@ static void test_testbed_default_holds_limits_between_the_samples(void)
            effective_torque(), used);
     TEST_ASSERT_TRUE(used <= 1);
     TEST_ASSERT_TRUE(used > 0.999);
-    TEST_ASSERT_TRUE(effective_torque() >= 0.705); // 1 kHz L-infinity scaled down until it holds: 0.696
+    TEST_ASSERT_TRUE(effective_torque() >= 0.715); // 1 kHz L-infinity scaled down until it holds: 0.696
 }
 
 int main(void)
@@ -206,7 +218,9 @@ int main(void)
     RUN_TEST(test_testbed_standard_clipping_by_all_limits);
     RUN_TEST(test_testbed_standard_clipping_by_acceleration);
     RUN_TEST(test_testbed_modified_clipping);
+    RUN_TEST(test_testbed_linf);
     RUN_TEST(test_testbed_newman_phases);
+    RUN_TEST(test_testbed_fast_single_start);
     RUN_TEST(test_testbed_fast);
     RUN_TEST(test_testbed_default_holds_limits_between_the_samples);
     return UNITY_END();

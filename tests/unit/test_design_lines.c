@@ -45,6 +45,16 @@ static void test_lines_linear_covers_both_ends(void)
     }
 }
 
+static void test_lines_of_a_sequence_are_those_of_linear(void)
+{
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, parse("octaves:0.5:100:0.5"), error.message);
+    TEST_ASSERT_EQUAL_size_t(200, lines.count);
+    TEST_ASSERT_EQUAL_UINT32(1, lines.step_bins);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, parse("dwell:1:100:1.5"), error.message);
+    TEST_ASSERT_EQUAL_size_t(67, lines.count);
+    TEST_ASSERT_EQUAL_UINT32(3, lines.step_bins);
+}
+
 static void test_lines_linear_stops_below_fmax_when_the_step_misses_it(void)
 {
     const uint32_t expected[] = {2, 5, 8};
@@ -162,8 +172,7 @@ static void test_lines_refused_with_value_and_expectation(void)
         {"odd:2:2.4:1", "no line is left"},
         {"quasilog:1:10:1", "RATIO 1, expected a number above 1"},
         {"list:", "expected linear:"},
-        {"octaves:1:10:1", "not available yet"},
-        {"dwell:1:10:1", "not available yet"},
+        {"octaves:1:10", "expected three numbers, octaves:FMIN:FMAX:STEP"},
         {"cubic:1:10:1", "expected linear:"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -175,6 +184,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_lines_linear_covers_both_ends);
+    RUN_TEST(test_lines_of_a_sequence_are_those_of_linear);
     RUN_TEST(test_lines_linear_stops_below_fmax_when_the_step_misses_it);
     RUN_TEST(test_lines_linear_reaches_the_highest_bin);
     RUN_TEST(test_lines_odd_takes_odd_multiples_only);

@@ -152,6 +152,74 @@ static void test_gather_is_the_adjoint_of_synthesise(void)
     design_waveform_free(&waveform);
 }
 
+/// Interleaved series are the same signals in another order, also where transforms are so short that lines fall onto
+/// each other.
+static void test_folded_waveform_is_the_same_in_another_order(void)
+{
+    struct design_waveform plain;
+    double c[2 * lines];
+    double y[2 * lines];
+    double y_folded[2 * lines];
+    TEST_ASSERT_TRUE(design_waveform_create(&spectrum, design_waveform_physical, grid, &plain));
+    double *u = calloc(plain.packed_length, sizeof *u);
+    fill_random(c, 2 * lines, 6);
+    design_waveform_synthesise(&plain, c, u);
+    design_waveform_gather(&plain, u, y);
+    for (size_t fold = 2; fold <= 4; fold++) {
+        struct design_waveform folded;
+        TEST_ASSERT_TRUE(design_waveform_create_folded(&spectrum, design_waveform_physical, grid, fold, &folded));
+        double *u_folded = calloc(folded.packed_length, sizeof *u_folded);
+        design_waveform_synthesise(&folded, c, u_folded);
+        for (size_t i = 0; i < 3 * fold; i++) {
+            for (size_t n = 0; n < grid / fold; n++) {
+                double expected = u[2 * grid * (i % 3 / 2) + 2 * (n * fold + i / 3) + i % 3 % 2];
+                double got = u_folded[2 * (grid / fold) * (i / 2) + 2 * n + i % 2];
+                TEST_ASSERT_DOUBLE_WITHIN(1e5 * rounding, expected, got);
+            }
+        }
+        for (size_t signal = 0; signal < 3; signal++) {
+            TEST_ASSERT_DOUBLE_WITHIN(1e5 * rounding, design_waveform_peak(&plain, u, signal),
+                                      design_waveform_peak(&folded, u_folded, signal));
+        }
+        design_waveform_gather(&folded, u_folded, y_folded);
+        for (size_t i = 0; i < 2 * lines; i++) {
+            TEST_ASSERT_DOUBLE_WITHIN(rounding * fabs(y[i]) + rounding, y[i], y_folded[i]);
+        }
+        free(u_folded);
+        design_waveform_free(&folded);
+    }
+    free(u);
+    design_waveform_free(&plain);
+}
+
+/// From the definition, at bins beyond the lines too, and for one that is 0 and one beyond half the grid.
+static void test_transform_is_that_of_each_signal(void)
+{
+    enum { bin_count = 70 };
+    struct design_waveform folded;
+    static double transform[3 * 2 * bin_count];
+    TEST_ASSERT_TRUE(design_waveform_create_folded(&spectrum, design_waveform_physical, grid, 3, &folded));
+    double *x = calloc(folded.packed_length, sizeof *x);
+    fill_random(x, folded.packed_length, 7);
+    design_waveform_transform(&folded, x, bin_count, transform);
+    for (size_t signal = 0; signal < 3; signal++) {
+        for (size_t b = 0; b < bin_count; b++) {
+            double re = 0;
+            double im = 0;
+            for (size_t n = 0; n < grid; n++) {
+                size_t i = n % 3 * 3 + signal;
+                double value = x[2 * (grid / 3) * (i / 2) + 2 * (n / 3) + i % 2];
+                re += value * cos(two_pi * (double)(b * n) / grid);
+                im -= value * sin(two_pi * (double)(b * n) / grid);
+            }
+            TEST_ASSERT_DOUBLE_WITHIN(rounding, re, transform[2 * (signal * bin_count + b)]);
+            TEST_ASSERT_DOUBLE_WITHIN(rounding, im, transform[2 * (signal * bin_count + b) + 1]);
+        }
+    }
+    free(x);
+    design_waveform_free(&folded);
+}
+
 static void test_waveform_leaves_out_a_signal_that_cannot_reach_its_limit(void)
 {
     struct design_spectrum loose;
@@ -196,6 +264,8 @@ int main(void)
     RUN_TEST(test_bound_of_the_testbed);
     RUN_TEST(test_synthesise_equals_the_sum_of_cosines_and_its_derivatives);
     RUN_TEST(test_gather_is_the_adjoint_of_synthesise);
+    RUN_TEST(test_folded_waveform_is_the_same_in_another_order);
+    RUN_TEST(test_transform_is_that_of_each_signal);
     RUN_TEST(test_waveform_leaves_out_a_signal_that_cannot_reach_its_limit);
     RUN_TEST(test_smooth_length_is_the_least_one);
     return UNITY_END();

@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: MIT */
+/// Where a finished design begins in its period, and what a drive at rest will make of it.
+#ifndef SERVOSCOPE_DESIGN_START_H
+#define SERVOSCOPE_DESIGN_START_H
+
+#include "lab/design/design.h"
+
+/// Sets start_index as request->start says, and expected_transient: of request->start_model where there is one, else
+/// the mean over the bank of nominal drives.
+/// Errors: error_refused if memory is short, or for a start model that does not suit the request (other rate, unstable,
+///         an undamped resonance on a line); a bank that can say nothing leaves the transient unknown
+int design_start_apply(const struct design_request *request, struct design_result *io_result, struct error *out_error);
+
+#endif

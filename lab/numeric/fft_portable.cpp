@@ -1,0 +1,7 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/numeric/fft_lanes.hpp"
+
+const fft_code *fft_code_portable()
+{
+    return &lanes_code;
+}
