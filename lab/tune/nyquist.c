@@ -1,0 +1,177 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/tune/nyquist.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+static const double pi = 3.141592653589793;
+static const double degrees = 180.0 / 3.141592653589793;
+static const double first_gain_least = 2.0, last_gain_most = 0.5;
+
+/// Where the loop can still matter: 20 dB below 1.
+static const double gain_that_matters = 0.1;
+
+#if defined(__GNUC__)
+__attribute__((format(printf, 2, 3)))
+#endif
+static void
+give_up(struct nyquist *io_nyquist, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(io_nyquist->reason, sizeof io_nyquist->reason, format, arguments);
+    va_end(arguments);
+    io_nyquist->verdict = nyquist_undecided;
+}
+
+static double decibel(double magnitude)
+{
+    return 20.0 * log10(magnitude);
+}
+
+/// The plant's phase at the lowest line on the branch that leads back to 0 Hz: around 0 for a velocity, around -90
+/// degrees for a position, which covers a free inertia, friction, a spring and a delay.
+static double first_phase(const struct tune_plant *plant, double complex response)
+{
+    const double centre = plant->output == tune_output_velocity ? 0.0 : -0.5 * pi;
+    const double phase = carg(response);
+    return phase - 2.0 * pi * round((phase - centre) / (2.0 * pi));
+}
+
+/// Whether the lowest lines lead although the response falls: an inertia measured with the wrong sign. (What leads and
+/// rises is a spring, as friction is before it slides.)
+static bool leads_and_falls(const struct tune_plant *plant, const double complex *response)
+{
+    const double lead_least = 0.25 * pi, apart = 1.5, slope_most = -0.5;
+    const double centre = plant->output == tune_output_velocity ? 0.0 : -0.5 * pi;
+    size_t k = 1;
+    while (k + 1 < plant->count && plant->frequency_hz[k] < apart * plant->frequency_hz[0]) {
+        k++;
+    }
+    const double slope = log(cabs(response[k] / response[0])) / log(plant->frequency_hz[k] / plant->frequency_hz[0]);
+    return first_phase(plant, response[0]) - centre > lead_least && slope < slope_most;
+}
+
+static bool check_ends(const struct tune_plant *plant, const double complex *response, const double complex *loop,
+                       struct nyquist *io_nyquist)
+{
+    const double centre = plant->output == tune_output_velocity ? 0.0 : -0.5 * pi;
+    const double reach = 130.0 / degrees;
+    const size_t last = plant->count - 1;
+    const double phase = first_phase(plant, response[0]);
+    if (!(fabs(phase - centre) < reach) || leads_and_falls(plant, response)) {
+        give_up(io_nyquist,
+                "at the lowest line, %.4g Hz, the response has a phase of %.0f degrees, expected %.0f to %.0f (a wrong "
+                "sign of the %s?)",
+                plant->frequency_hz[0], phase * degrees, centre * degrees - 90.0, centre * degrees,
+                plant->output == tune_output_velocity ? "velocity" : "position");
+    } else if (!(cabs(loop[0]) >= first_gain_least)) {
+        give_up(io_nyquist,
+                "the open loop's gain at the lowest line, %.4g Hz, is %.1f dB, expected at least %.1f dB: lines below "
+                "the crossover are missing",
+                plant->frequency_hz[0], decibel(cabs(loop[0])), decibel(first_gain_least));
+    } else if (!(cabs(loop[last]) <= last_gain_most)) {
+        give_up(io_nyquist,
+                "the open loop's gain at the highest line, %.4g Hz, is %.1f dB, expected at most %.1f dB: lines above "
+                "the crossover are missing",
+                plant->frequency_hz[last], decibel(cabs(loop[last])), decibel(last_gain_most));
+    } else {
+        return true;
+    }
+    return false;
+}
+
+/// Whether the curve between two lines is known well enough to count its turns.
+static bool check_step(const struct tune_plant *plant, const double complex *response, const double complex *loop,
+                       size_t k, struct nyquist *io_nyquist)
+{
+    const double turn = carg((1.0 + loop[k + 1]) / (1.0 + loop[k]));
+    const double lag = carg(loop[k + 1] / loop[k]);
+    const double size = fmax(cabs(loop[k]), cabs(loop[k + 1]));
+    const double noise =
+        plant->confidence_factor * fmax(plant->std[k] / cabs(response[k]), plant->std[k + 1] / cabs(response[k + 1]));
+    const bool noisy = noise > 0.5;
+    if (fabs(turn) <= 0.5 * pi && !(lag < -0.5 * pi && size > gain_that_matters && !noisy)) {
+        return true;
+    }
+    give_up(io_nyquist,
+            "between the lines at %.6g and %.6g Hz the open loop turns by %.0f degrees (seen from -1 by %.0f): a "
+            "resonance may hide there, expected denser lines",
+            plant->frequency_hz[k], plant->frequency_hz[k + 1], lag * degrees, turn * degrees);
+    return false;
+}
+
+static bool check_noise(const struct tune_plant *plant, const double complex *response, const double complex *loop,
+                        struct nyquist *io_nyquist)
+{
+    for (size_t k = 0; k < plant->count; k++) {
+        const double radius = plant->confidence_factor * plant->std[k] * cabs(loop[k] / response[k]);
+        if (!(cabs(1.0 + loop[k]) > radius)) {
+            give_up(io_nyquist,
+                    "at %.6g Hz the open loop is %.3g away from -1 and known to +-%.3g only (95 %%): noise decides, "
+                    "expected more periods or a larger excitation there",
+                    plant->frequency_hz[k], cabs(1.0 + loop[k]), radius);
+            return false;
+        }
+    }
+    return true;
+}
+
+static void find_worst(const struct tune_plant *plant, const double complex *loop, struct nyquist *io_nyquist)
+{
+    io_nyquist->worst_distance = INFINITY;
+    for (size_t k = 0; k < plant->count; k++) {
+        if (cabs(1.0 + loop[k]) < io_nyquist->worst_distance) {
+            io_nyquist->worst_distance = cabs(1.0 + loop[k]);
+            io_nyquist->worst_hz = plant->frequency_hz[k];
+        }
+    }
+    io_nyquist->first_gain_db = decibel(cabs(loop[0]));
+    io_nyquist->last_gain_db = decibel(cabs(loop[plant->count - 1]));
+}
+
+static void state_assumptions(const struct tune_plant *plant, struct nyquist *io_nyquist)
+{
+    const size_t size = sizeof io_nyquist->assumptions[0];
+    snprintf(io_nyquist->assumptions[0], size, "the drive alone is stable, but for the integration of a free inertia");
+    snprintf(io_nyquist->assumptions[1], size,
+             "below %.4g Hz, the lowest line, the open loop's gain (%.1f dB there) does not fall below 0 dB",
+             plant->frequency_hz[0], io_nyquist->first_gain_db);
+    snprintf(io_nyquist->assumptions[2], size,
+             "above %.4g Hz, the highest line, the open loop's gain (%.1f dB there) does not rise above 0 dB",
+             plant->frequency_hz[plant->count - 1], io_nyquist->last_gain_db);
+}
+
+void nyquist_judge(const struct tune_plant *plant, const double complex *response, const double complex *loop,
+                   const struct tune_controller *controller, bool use_std, struct nyquist *out_nyquist)
+{
+    *out_nyquist = (struct nyquist){.verdict = nyquist_undecided};
+    find_worst(plant, loop, out_nyquist);
+    state_assumptions(plant, out_nyquist);
+    if (!check_ends(plant, response, loop, out_nyquist)) {
+        return;
+    }
+    // Terms with gains >= 0 stay within 90 degrees of each other, and a biquad's phase within 180, so the controller's
+    // principal phase is the one that is followed from 0 Hz. With |L| > 1 the phases of 1 + L and L differ by less than
+    // 90 degrees.
+    const double controller_phase = carg(tune_controller_at(controller, plant->delay[0]));
+    double phase = controller_phase + first_phase(plant, response[0]) + carg(1.0 + 1.0 / loop[0]);
+    for (size_t k = 0; k + 1 < plant->count; k++) {
+        if (!check_step(plant, response, loop, k, out_nyquist)) {
+            return;
+        }
+        phase += carg((1.0 + loop[k + 1]) / (1.0 + loop[k]));
+    }
+    if (use_std && !check_noise(plant, response, loop, out_nyquist)) {
+        return;
+    }
+    const long turns = lround((phase - carg(1.0 + loop[plant->count - 1])) / (2.0 * pi));
+    if (turns > 0) {
+        give_up(out_nyquist, "the open loop turns %ld times round -1 against the clock: the drive alone is unstable",
+                turns);
+        return;
+    }
+    out_nyquist->unstable_poles = (int)(-2 * turns);
+    out_nyquist->verdict = turns == 0 ? nyquist_stable : nyquist_unstable;
+}

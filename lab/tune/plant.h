@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: MIT */
+/// The plant of a loop as it was measured: the valid lines of a frequency response at the controller's sampling rate.
+#ifndef SERVOSCOPE_TUNE_PLANT_H
+#define SERVOSCOPE_TUNE_PLANT_H
+
+#include "lab/record/frf_file.h"
+
+#include <complex.h>
+#include <stdbool.h>
+#include <stddef.h>
+
+enum { tune_unit_size = 32 };
+
+/// What the controller is fed back with; decides units and which phase is believed at the lowest line.
+enum tune_output { tune_output_velocity, tune_output_position };
+
+struct tune_plant {
+    size_t count;
+    double rate_hz;
+    double *frequency_hz;     ///< ascending, above 0, below half the rate
+    double complex *response; ///< with the loop's delay that the file does not contain
+    double *std;              ///< of the complex value; 0 where the file does not say
+    double complex *delay;    ///< exp(-j w Ts), one sample of delay
+    bool std_known;           ///< on any line
+    double confidence_factor; ///< 95 % of errors lie within this many std
+    size_t skipped;           ///< lines not valid, at 0 Hz or from half the rate on
+    double loop_delay_s;
+    enum tune_output output;
+    const char *effort_unit; ///< of the controller's output: Nm, N, A, V
+    const char *length_unit; ///< rad or m
+};
+
+/// Takes the valid lines of a response. The rate is `rate_hz`, or if that is 0 the key sample_rate_hz of the file.
+/// `loop_delay_s` is delay of the loop that is not in the response (a bus, a computing sample).
+/// Errors: error_usage without a rate; error_refused if input and output are not torque, force, current or voltage to
+///         velocity or position, or fewer than 8 lines can be used. *out_plant is empty then. `path` begins messages.
+/// Test:   tests/unit/test_tune_plant.c
+int tune_plant_take(const char *path, const struct frf *frf, double rate_hz, double loop_delay_s,
+                    struct tune_plant *out_plant, struct error *out_error);
+
+/// Frees what tune_plant_take() gave; harmless on a zeroed struct.
+void tune_plant_free(struct tune_plant *self);
+
+/// Writes the unit of a gain that has s to the power `power` in it beside effort over velocity (-1: integral, 0:
+/// proportional, 1: derivative): for file names of values "Nms_per_rad", for people "Nm s/rad".
+void tune_plant_gain_unit(const struct tune_plant *self, int power, char out_suffix[tune_unit_size],
+                          char out_readable[tune_unit_size]);
+
+#endif

@@ -1,0 +1,315 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/tune/report.h"
+
+#include "lab/estimate/report.h"
+#include "lab/page/layout.h"
+#include "lab/tune/say.h"
+
+#include <complex.h>
+#include <ctype.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double two_pi = 6.283185307179586;
+static const double degrees_per_rad = 57.29577951308232;
+
+static double decibel(double magnitude)
+{
+    return 20.0 * log10(magnitude); // minus infinity for 0: a gap in the figure
+}
+
+/// Every curve of the page, on the plant's lines.
+struct curves {
+    double *memory;
+    double *open_db, *open_low_db, *open_high_db, *open_deg, *open_deg_low, *open_deg_high;
+    double *sensitivity_db, *closed_db, *closed_deg, *reference_db, *reference_deg;
+    double *real, *imag;
+};
+
+/// Follows the phase along frequency; the first value lies in -270 .. 90 degrees.
+static void unwrap(size_t count, double *phase_deg)
+{
+    double centre = -90.0;
+    for (size_t k = 0; k < count; k++) {
+        phase_deg[k] -= 360.0 * round((phase_deg[k] - centre) / 360.0);
+        centre = phase_deg[k];
+    }
+}
+
+static bool make_curves(const struct tune_result *result, struct curves *out)
+{
+    enum { arrays = 13 };
+    const size_t count = result->plant.count;
+    out->memory = malloc(arrays * count * sizeof *out->memory);
+    if (!out->memory) {
+        return false;
+    }
+    double **const all[arrays] = {
+        &out->open_db,       &out->open_low_db,    &out->open_high_db, &out->open_deg,   &out->open_deg_low,
+        &out->open_deg_high, &out->sensitivity_db, &out->closed_db,    &out->closed_deg, &out->reference_db,
+        &out->reference_deg, &out->real,           &out->imag,
+    };
+    for (size_t i = 0; i < arrays; i++) {
+        *all[i] = out->memory + i * count;
+    }
+    for (size_t k = 0; k < count; k++) {
+        const double complex loop = result->loop[k], closed = loop / (1.0 + loop);
+        const double share = 2.0 * result->plant.std[k] / cabs(result->plant.response[k]);
+        out->open_db[k] = decibel(cabs(loop));
+        out->open_low_db[k] = decibel(cabs(loop) * fmax(1.0 - share, 0.0));
+        out->open_high_db[k] = decibel(cabs(loop) * (1.0 + share));
+        out->open_deg[k] = degrees_per_rad * carg(loop);
+        out->open_deg_high[k] = degrees_per_rad * (share < 1.0 ? asin(share) : 0.5 * two_pi);
+        out->sensitivity_db[k] = decibel(1.0 / cabs(1.0 + loop));
+        out->closed_db[k] = decibel(cabs(closed));
+        out->closed_deg[k] = degrees_per_rad * carg(closed);
+        out->reference_db[k] = decibel(cabs(result->reference[k]));
+        out->reference_deg[k] = degrees_per_rad * carg(result->reference[k]);
+        out->real[k] = creal(loop);
+        out->imag[k] = cimag(loop);
+    }
+    unwrap(count, out->open_deg);
+    unwrap(count, out->closed_deg);
+    unwrap(count, out->reference_deg);
+    for (size_t k = 0; k < count; k++) {
+        out->open_deg_low[k] = out->open_deg[k] - out->open_deg_high[k];
+        out->open_deg_high[k] = out->open_deg[k] + out->open_deg_high[k];
+    }
+    return true;
+}
+
+// ---- Words and tables
+
+static void add_gains(struct page *page, const struct tune_result *result)
+{
+    char text[say_size];
+    const struct tune_controller *controller = &result->solution.controller;
+    for (size_t i = 0; i < controller->structure->gains; i++) {
+        say_gain(result, i, "±", text);
+        page_add_pair(page, tune_term_symbol(controller->structure->terms[i]), "%s", text);
+    }
+    if (controller->corner_hz > 0.0) {
+        page_add_pair(page, "Derivative", "filtered, a = exp(-2 pi f Ts) with f = %.5g Hz", controller->corner_hz);
+    }
+    if (controller->filter.on) {
+        const struct tune_filter *f = &controller->filter;
+        say_filter(f, text);
+        page_add_pair(page, "Filter C(z)", "%s: b = %.9g, %.9g, %.9g; a = 1, %.9g, %.9g", text, f->b[0], f->b[1],
+                      f->b[2], f->a[1], f->a[2]);
+    }
+}
+
+static void add_setup(struct page *page, const struct tune_result *result)
+{
+    const struct tune_solution *solution = &result->solution;
+    const struct tune_reference *reference = &solution->reference;
+    const struct say_model_controller model = say_model_controller(result);
+    page_start_pairs(page);
+    page_add_pair(page, "Controller", "K(z) = %s, at %.6g Hz, from the %s error to %s",
+                  solution->controller.structure->form, solution->controller.rate_hz,
+                  result->plant.output == tune_output_velocity ? "velocity" : "position", result->plant.effort_unit);
+    add_gains(page, result);
+    if (model.exists) {
+        page_add_pair(page, "In a model file",
+                      "%s %.6g, velocity_integral_time_s %.6g (its integral begins a sample "
+                      "later)",
+                      model.gain_name, model.gain, model.integral_time_s);
+    }
+    page_add_pair(page, "Reference", "second order of %.5g Hz, damping %.3g, %.3g sample(s) of delay",
+                  reference->bandwidth_hz, reference->damping, reference->delay_samples);
+    page_add_pair(page, "Fit", "%s least squares, %s weighting; error against the reference %.2f dB (weighted RMS)",
+                  solution->reweighted ? "reweighted" : "linear",
+                  result->weighting == tune_weighting_log ? "log-frequency" : "flat", 10.0 * log10(solution->cost));
+    if (result->resonance.found) {
+        page_add_pair(page, "Resonance found", "%.4g Hz, damping %.3g, %.3g dB high", result->resonance.frequency_hz,
+                      result->resonance.damping, result->resonance.prominence_db);
+    }
+    page_end_pairs(page);
+}
+
+static void add_margins(struct page *page, const struct tune_result *result)
+{
+    static const char *const heads[] = {"margin", "value", "std", "unit", "at Hz"};
+    struct say_margin margins[say_margins_max];
+    const size_t count = say_margins(result, margins);
+    page_start_table(page, "Margins", "lrrlr", heads);
+    for (size_t i = 0; i < count; i++) {
+        char value[32], std[32], at[32];
+        if (!isfinite(margins[i].value) && i > 0) {
+            continue; // a dash says that the gain may rise without limit; of the others it would say nothing
+        }
+        snprintf(value, sizeof value, "%.4g", margins[i].value);
+        snprintf(std, sizeof std, "%.2g", margins[i].std);
+        snprintf(at, sizeof at, "%.4g", margins[i].at_hz);
+        const char *cells[] = {margins[i].name, isfinite(margins[i].value) ? value : NULL,
+                               isfinite(margins[i].std) ? std : NULL, margins[i].unit,
+                               isfinite(margins[i].at_hz) ? at : NULL};
+        page_add_row(page, cells);
+    }
+    page_end_table(page);
+    if (result->deviation.known) {
+        page_add_paragraph(page,
+                           "Standard deviations follow from those of the response, by %d responses drawn from it: of "
+                           "gains, how they would scatter if the measurement were repeated; of margins, how well those "
+                           "of the gains above are known. %zu of the %d drawn loops are stable.",
+                           (int)tune_draws, result->deviation.stable, (int)tune_draws);
+    }
+}
+
+static void add_verdict(struct page *page, const struct tune_result *result)
+{
+    char gains[say_size], performance[say_size];
+    say_gains(&result->plant, &result->solution.controller, gains);
+    say_performance(result, performance);
+    page_add_note(page, page_good, gains, "%s", performance);
+    for (size_t i = 0; i < result->warning_count; i++) {
+        const char *text = result->warnings[i];
+        page_add_note(page, page_warning, "Mind", "%c%s.", toupper((unsigned char)text[0]), text + 1);
+    }
+}
+
+static void add_stability(struct page *page, const struct tune_result *result)
+{
+    const struct nyquist *nyquist = &result->solution.nyquist;
+    page_add_paragraph(page,
+                       "Stable by Nyquist's criterion: from 0 Hz to half the rate the open loop does not turn round "
+                       "-1, which it passes at a distance of %.3g at %.4g Hz. This takes for granted that",
+                       nyquist->worst_distance, nyquist->worst_hz);
+    page_start_list(page);
+    for (size_t i = 0; i < nyquist_assumptions; i++) {
+        page_add_item(page, "", "%s.", nyquist->assumptions[i]);
+    }
+    page_end_list(page);
+}
+
+// ---- Figures
+
+static void add_open_loop(struct page *page, const struct tune_result *result, const struct curves *curves)
+{
+    struct figure figure;
+    const size_t count = result->plant.count;
+    const double *f = result->plant.frequency_hz;
+    figure_start(&figure, "frequency in Hz", axis_log);
+    struct figure_panel *magnitude = figure_add_panel(&figure, "open loop K G in dB", axis_linear);
+    struct figure_panel *phase = figure_add_panel(&figure, "phase in degrees", axis_degrees);
+    phase->height = 130;
+    if (result->plant.std_known) {
+        figure_add_band(magnitude, "±2 std", count, f, curves->open_low_db, curves->open_high_db);
+        figure_add_band(phase, "", count, f, curves->open_deg_low, curves->open_deg_high);
+    }
+    figure_add_line(magnitude, "K G", count, f, curves->open_db)->colour = figure_blue;
+    figure_add_line(phase, "", count, f, curves->open_deg)->colour = figure_blue;
+    figure_add_limit(magnitude, "0 dB", 0.0);
+    figure_add_limit(phase, "-180 degrees", -180.0);
+    page_add_figure(page, &figure, "Open loop: controller times measured response.");
+}
+
+static void add_closed_loop(struct page *page, const struct tune_result *result, const struct curves *curves)
+{
+    struct figure figure;
+    const size_t count = result->plant.count;
+    const double *f = result->plant.frequency_hz;
+    figure_start(&figure, "frequency in Hz", axis_log);
+    struct figure_panel *closed = figure_add_panel(&figure, "T = KG/(1+KG) in dB", axis_linear);
+    struct figure_panel *phase = figure_add_panel(&figure, "phase of T in degrees", axis_degrees);
+    struct figure_panel *sensitivity = figure_add_panel(&figure, "S = 1/(1+KG) in dB", axis_linear);
+    struct figure_series *reference[2];
+    closed->low = -40.0;
+    phase->height = 110;
+    sensitivity->low = -40.0;
+    figure_add_line(closed, "T", count, f, curves->closed_db)->colour = figure_blue;
+    reference[0] = figure_add_line(closed, "reference M", count, f, curves->reference_db);
+    figure_add_limit(closed, "-3 dB", -10.0 * log10(2.0));
+    figure_add_line(phase, "", count, f, curves->closed_deg)->colour = figure_blue;
+    reference[1] = figure_add_line(phase, "", count, f, curves->reference_deg);
+    for (size_t i = 0; i < 2; i++) {
+        reference[i]->colour = figure_vermilion;
+        reference[i]->dash = figure_dashed;
+    }
+    figure_add_line(sensitivity, "S", count, f, curves->sensitivity_db)->colour = figure_green;
+    figure_add_limit(sensitivity, "6 dB", decibel(2.0));
+    page_add_figure(page, &figure,
+                    "Complementary sensitivity T (command to response) beside the reference M, and sensitivity S "
+                    "(what is left of a disturbance).");
+}
+
+enum { circle_points = 181 };
+
+static void fill_circle(double centre, double radius, double *out_x, double *out_y)
+{
+    for (size_t i = 0; i < circle_points; i++) {
+        const double angle = two_pi * (double)i / (circle_points - 1);
+        out_x[i] = centre + radius * cos(angle);
+        out_y[i] = radius * sin(angle);
+    }
+}
+
+static void add_nyquist(struct page *page, const struct tune_result *result, const struct curves *curves)
+{
+    const double shown = 2.0, minus_one = -1.0, zero = 0.0;
+    double unit[2][circle_points], modulus[2][circle_points];
+    struct figure figure;
+    struct layout *layout = malloc(sizeof *layout);
+    if (!layout) {
+        page_add_paragraph(page, "Memory was short for this figure.");
+        return;
+    }
+    fill_circle(0.0, 1.0, unit[0], unit[1]);
+    fill_circle(-1.0, 1.0 / result->margins.modulus, modulus[0], modulus[1]);
+    figure_start(&figure, "real part of K G", axis_linear);
+    figure.width = 0.7 * figure_width_full;
+    figure.legend = figure_legend_below;
+    figure.x_low = -shown - 0.5;
+    figure.x_high = shown - 0.5;
+    struct figure_panel *panel = figure_add_panel(&figure, "imaginary part of K G", axis_linear);
+    panel->low = -shown;
+    panel->high = shown;
+    struct figure_series *circle = figure_add_line(panel, "unit circle", circle_points, unit[0], unit[1]);
+    circle->colour = figure_grey;
+    circle->dash = figure_dotted;
+    circle = figure_add_line(panel, "modulus margin: no nearer to -1", circle_points, modulus[0], modulus[1]);
+    circle->colour = figure_vermilion;
+    circle->dash = figure_dashed;
+    struct figure_series *curve = figure_add_line(panel, "K G", result->plant.count, curves->real, curves->imag);
+    curve->colour = figure_blue;
+    curve->dash = figure_solid;
+    struct figure_series *lines = figure_add_points(panel, "", result->plant.count, curves->real, curves->imag);
+    lines->colour = figure_blue;
+    lines->size = 3;
+    struct figure_series *point = figure_add_points(panel, "-1", 1, &minus_one, &zero);
+    point->colour = figure_vermilion;
+    point->marker = figure_cross;
+    point->size = 9;
+    // The frame's width is known after laying out; a circle has to look like one.
+    layout_find(&figure, layout);
+    panel->height = layout->width;
+    page_add_figure(page, &figure,
+                    "Nyquist plot of the measured lines; the dashed circle has the radius 1/max|S| = "
+                    "%.3g.",
+                    1.0 / result->margins.modulus);
+    free(layout);
+}
+
+void tune_report_sections(struct page *page, const struct frf *frf, const struct tune_result *result)
+{
+    struct curves curves;
+    add_verdict(page, result);
+    page_add_section(page, "Controller");
+    add_setup(page, result);
+    page_add_section(page, "Margins");
+    add_margins(page, result);
+    add_stability(page, result);
+    if (make_curves(result, &curves)) {
+        page_add_section(page, "Closed loop");
+        add_closed_loop(page, result, &curves);
+        page_add_section(page, "Open loop");
+        add_open_loop(page, result, &curves);
+        add_nyquist(page, result, &curves);
+        free(curves.memory);
+    } else {
+        page_add_paragraph(page, "Memory was short for the figures.");
+    }
+    frf_report_section(page, frf, NULL);
+}

@@ -1,0 +1,147 @@
+/* SPDX-License-Identifier: MIT */
+/// What tuning takes from a response file: which lines, which units, which rate; and what it refuses.
+#include "lab/tune/plant.h"
+#include "tests/support/known_drive.h"
+#include "unity.h"
+
+#include <math.h>
+#include <string.h>
+
+static struct frf frf;
+static struct tune_plant plant;
+static struct error error;
+
+void setUp(void)
+{
+    const struct known_drive drive = known_rigid(2000.0, 1, 0.005, 0.01);
+    frf = known_frf(&drive, 0.0, 10.0, 120); // 0 .. 1190 Hz, half the rate is 1000 Hz
+}
+
+void tearDown(void)
+{
+    tune_plant_free(&plant);
+    frf_free(&frf);
+}
+
+static void refuses(int status, const char *part)
+{
+    TEST_ASSERT_EQUAL_INT(status, tune_plant_take("f.csv", &frf, 0.0, 0.0, &plant, &error));
+    TEST_ASSERT_TRUE_MESSAGE(strstr(error.message, part) != NULL, error.message);
+    TEST_ASSERT_NULL(plant.response);
+}
+
+static void test_tune_plant_leaves_out_lines_that_cannot_be_used(void)
+{
+    frf.valid[5] = false;
+    frf.real[7] = frf.imag[7] = 0.0;
+    TEST_ASSERT_EQUAL_INT(0, tune_plant_take("f.csv", &frf, 0.0, 0.0, &plant, &error));
+    // Of 120 lines 0 Hz, 20 from 1000 Hz on, one not valid, one without a response.
+    TEST_ASSERT_EQUAL_size_t(97, plant.count);
+    TEST_ASSERT_EQUAL_size_t(23, plant.skipped);
+    TEST_ASSERT_EQUAL_DOUBLE(2000.0, plant.rate_hz);
+    TEST_ASSERT_EQUAL_DOUBLE(10.0, plant.frequency_hz[0]);
+    TEST_ASSERT_EQUAL_DOUBLE(990.0, plant.frequency_hz[96]);
+    TEST_ASSERT_FALSE(plant.std_known);
+}
+
+static void test_tune_plant_takes_standard_deviations_and_their_confidence(void)
+{
+    const double factor_of_ten_periods = 1.8855; // root of 3.555, F(2, 18) at 95 %
+    frf.std[3] = 0.25;
+    frf.degrees_of_freedom = 18.0;
+    TEST_ASSERT_EQUAL_INT(0, tune_plant_take("f.csv", &frf, 0.0, 0.0, &plant, &error));
+    TEST_ASSERT_TRUE(plant.std_known);
+    TEST_ASSERT_EQUAL_DOUBLE(0.25, plant.std[2]);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, plant.std[3]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, factor_of_ten_periods, plant.confidence_factor);
+}
+
+static void test_tune_plant_adds_the_loops_delay(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, tune_plant_take("f.csv", &frf, 0.0, 0.001, &plant, &error));
+    const double complex measured = frf.real[25] + frf.imag[25] * I; // 250 Hz: 1 ms is a quarter of a turn
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, cabs(plant.response[24] - measured * -I));
+}
+
+static void test_tune_plant_rate_of_the_option_goes_before_the_file(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, tune_plant_take("f.csv", &frf, 4000.0, 0.0, &plant, &error));
+    TEST_ASSERT_EQUAL_DOUBLE(4000.0, plant.rate_hz);
+    TEST_ASSERT_EQUAL_size_t(119, plant.count);
+}
+
+static void test_tune_plant_names_units(void)
+{
+    static const struct {
+        const char *input, *output, *suffixes[3], *readables[3];
+    } cases[] = {
+        {"torque_Nm",
+         "velocity_rad_per_s",
+         {"Nm_per_rad", "Nms_per_rad", "Nms2_per_rad"},
+         {"Nm/rad", "Nm s/rad", "Nm s^2/rad"}},
+        {"force_ref_N", "velocity_m_per_s", {"N_per_m", "Ns_per_m", "Ns2_per_m"}, {"N/m", "N s/m", "N s^2/m"}},
+        {"torque_1_Nm",
+         "load_position_rad",
+         {"Nm_per_rad_s", "Nm_per_rad", "Nms_per_rad"},
+         {"Nm/(rad s)", "Nm/rad", "Nm s/rad"}},
+        {"current_A",
+         "velocity_rad_per_s",
+         {"A_per_rad", "As_per_rad", "As2_per_rad"},
+         {"A/rad", "A s/rad", "A s^2/rad"}},
+        {"voltage_V", "position_m", {"V_per_m_s", "V_per_m", "Vs_per_m"}, {"V/(m s)", "V/m", "V s/m"}},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        TEST_ASSERT_TRUE(frf_set_text(&frf.input, cases[i].input) && frf_set_text(&frf.output, cases[i].output));
+        TEST_ASSERT_EQUAL_INT(0, tune_plant_take("f.csv", &frf, 0.0, 0.0, &plant, &error));
+        for (int power = -1; power <= 1; power++) {
+            char suffix[tune_unit_size], readable[tune_unit_size];
+            tune_plant_gain_unit(&plant, power, suffix, readable);
+            TEST_ASSERT_EQUAL_STRING(cases[i].suffixes[power + 1], suffix);
+            TEST_ASSERT_EQUAL_STRING(cases[i].readables[power + 1], readable);
+        }
+        tune_plant_free(&plant);
+    }
+}
+
+static void test_tune_plant_refuses_other_quantities(void)
+{
+    TEST_ASSERT_TRUE(frf_set_text(&frf.input, "velocity_ref_rad_per_s"));
+    refuses(error_refused, "from 'velocity_ref_rad_per_s' to 'velocity_rad_per_s'");
+    TEST_ASSERT_TRUE(frf_set_text(&frf.input, "torque_Nm") && frf_set_text(&frf.output, "acceleration_rad_per_s2"));
+    refuses(error_refused, "to 'acceleration_rad_per_s2': expected");
+    free(frf.output);
+    frf.output = NULL; // a file without keys
+    refuses(error_refused, "to ''");
+}
+
+static void test_tune_plant_refuses_a_rate_that_is_none(void)
+{
+    static const char *const rates[] = {"fast", "0", "-2000", ""};
+    for (size_t i = 0; i < sizeof rates / sizeof *rates; i++) {
+        TEST_ASSERT_TRUE(frf_set_text(&frf.keys[0].value, rates[i]));
+        refuses(error_refused, "sample_rate_hz");
+    }
+    TEST_ASSERT_TRUE(frf_set_text(&frf.keys[0].key, "other"));
+    refuses(error_usage, "expected --rate HZ");
+}
+
+static void test_tune_plant_refuses_too_few_lines(void)
+{
+    for (size_t k = 8; k < frf.count; k++)
+        frf.valid[k] = false;
+    refuses(error_refused, "7 of 120 lines are valid");
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_tune_plant_leaves_out_lines_that_cannot_be_used);
+    RUN_TEST(test_tune_plant_takes_standard_deviations_and_their_confidence);
+    RUN_TEST(test_tune_plant_adds_the_loops_delay);
+    RUN_TEST(test_tune_plant_rate_of_the_option_goes_before_the_file);
+    RUN_TEST(test_tune_plant_names_units);
+    RUN_TEST(test_tune_plant_refuses_other_quantities);
+    RUN_TEST(test_tune_plant_refuses_a_rate_that_is_none);
+    RUN_TEST(test_tune_plant_refuses_too_few_lines);
+    return UNITY_END();
+}
