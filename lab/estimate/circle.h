@@ -22,6 +22,11 @@ struct circle circle_of_column(const double complex *values, size_t rows, size_t
 /// 1 if the mean is zero.
 double circle_chance_of_zero(const struct circle *self);
 
+/// Returns how many times its variance over `count` values the power of a mean must be, for scatter alone to explain it
+/// with less than `chance`: count |mean|^2 / variance > ratio is circle_chance_of_zero < chance, without its
+/// logarithms.
+double circle_certain_ratio(double chance, size_t count);
+
 /// Returns the factor c for which |error| <= c std holds with the given probability.
 /// std = sqrt(E|error|^2) is itself an estimate, with dof_complex complex degrees of freedom (M - 1 for M periods).
 ///

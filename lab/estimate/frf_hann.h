@@ -4,6 +4,7 @@
 #ifndef SERVOSCOPE_ESTIMATE_FRF_HANN_H
 #define SERVOSCOPE_ESTIMATE_FRF_HANN_H
 
+#include "lab/estimate/options.h"
 #include "lab/estimate/periodic.h"
 #include "lab/record/frf_file.h"
 
@@ -15,6 +16,7 @@
 ///            2 n / (1 + 2 ((4/9)(n-1) + (1/36)(n-2)) / n) for each side's n = P/2 - 1 lines
 /// Errors:    error_refused if fewer than 4 consecutive periods are usable, no line has power, or memory is short
 /// Test:      tests/unit/test_frf_hann.c
-int frf_hann_estimate(const struct periodic *recording, struct frf *out_frf, struct error *out_error);
+int frf_hann_estimate(const struct periodic *recording, const struct estimate_options *options, struct frf *out_frf,
+                      struct error *out_error);
 
 #endif

@@ -5,37 +5,98 @@
 #include "lab/estimate/method.h"
 
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 static double power(double complex z)
 {
     return creal(z) * creal(z) + cimag(z) * cimag(z);
 }
 
-static void estimate_line(const struct periodic *recording, size_t line, struct frf *io_frf)
+/// Lines are worked on in blocks whose values of all periods stay in the second cache while they are passed over twice.
+enum { block_lines = 512, block_values = 16384, fewest_block_lines = 16 };
+
+static size_t lines_in_block(size_t periods)
 {
-    size_t stride = recording->bin_count;
-    size_t periods = recording->used;
-    struct circle input = circle_of_column(recording->input_spectra, periods, stride, line);
-    struct circle output = circle_of_column(recording->output_spectra, periods, stride, line);
-    if (!(circle_chance_of_zero(&input) < estimate_chance_of_dead_line)) {
-        return;
-    }
-    double complex response = output.mean / input.mean;
-    double sum = 0.0;
-    for (size_t m = 0; m < periods; m++) {
-        double complex output_scatter = recording->output_spectra[m * stride + line] - output.mean;
-        double complex input_scatter = recording->input_spectra[m * stride + line] - input.mean;
-        sum += power(output_scatter - response * input_scatter);
-    }
-    double variance = sum / ((double)periods * (double)(periods - 1) * power(input.mean));
-    estimate_set_line(io_frf, line, response, sqrt(variance));
+    size_t lines = block_values / periods;
+    return lines > block_lines ? block_lines : lines < fewest_block_lines ? fewest_block_lines : lines;
 }
 
-int frf_mean_estimate(const struct periodic *recording, struct frf *out_frf, struct error *out_error)
+struct block {
+    double complex input[block_lines]; ///< mean spectra
+    double complex output[block_lines];
+    double input_scatter[block_lines]; ///< sum |U_m - Ubar|^2
+    double residual[block_lines];      ///< sum |(Y_m - Ybar) - G (U_m - Ubar)|^2
+};
+
+static void sum_means(const struct periodic *recording, size_t first, size_t lines, struct block *out)
 {
-    int status = estimate_begin(recording, "mean", 2.0 * (double)(recording->used - 1), out_frf, out_error);
-    for (size_t line = 0; line < recording->bin_count && !status; line++) {
-        estimate_line(recording, line, out_frf);
+    memset(out, 0, sizeof *out);
+    for (size_t m = 0; m < recording->used; m++) {
+        size_t row = m * recording->bin_count + first;
+        for (size_t b = 0; b < lines; b++) {
+            out->input[b] += recording->input_spectra[row + b];
+            out->output[b] += recording->output_spectra[row + b];
+        }
     }
+    for (size_t b = 0; b < lines; b++) {
+        out->input[b] /= (double)recording->used;
+        out->output[b] /= (double)recording->used;
+    }
+}
+
+static void sum_scatter(const struct periodic *recording, size_t first, size_t lines, const double complex *responses,
+                        struct block *io_block)
+{
+    for (size_t m = 0; m < recording->used; m++) {
+        size_t row = m * recording->bin_count + first;
+        for (size_t b = 0; b < lines; b++) {
+            double complex input = recording->input_spectra[row + b] - io_block->input[b];
+            double complex output = recording->output_spectra[row + b] - io_block->output[b];
+            double complex response = responses[b];
+            /* Part by part: a product of complex numbers would look for infinities each time. */
+            double real = creal(output) - creal(response) * creal(input) + cimag(response) * cimag(input);
+            double imaginary = cimag(output) - creal(response) * cimag(input) - cimag(response) * creal(input);
+            io_block->input_scatter[b] += power(input);
+            io_block->residual[b] += real * real + imaginary * imaginary;
+        }
+    }
+}
+
+static void estimate_block(const struct periodic *recording, size_t first, size_t lines, struct block *io_block,
+                           struct frf *io_frf)
+{
+    double complex responses[block_lines];
+    double count = (double)recording->used;
+    double certain_ratio = circle_certain_ratio(estimate_chance_of_dead_line, recording->used);
+    sum_means(recording, first, lines, io_block);
+    for (size_t b = 0; b < lines; b++) {
+        responses[b] = io_block->output[b] / io_block->input[b];
+    }
+    sum_scatter(recording, first, lines, responses, io_block);
+    for (size_t b = 0; b < lines; b++) {
+        double input_power = power(io_block->input[b]);
+        if (count * input_power > certain_ratio * io_block->input_scatter[b] / (count - 1.0)) {
+            double variance = io_block->residual[b] / (count * (count - 1.0) * input_power);
+            estimate_set_line(io_frf, first + b, responses[b], sqrt(variance));
+        }
+    }
+}
+
+int frf_mean_estimate(const struct periodic *recording, const struct estimate_options *options, struct frf *out_frf,
+                      struct error *out_error)
+{
+    (void)options;
+    int status = estimate_begin(recording, "mean", 2.0 * (double)(recording->used - 1), out_frf, out_error);
+    struct block *block = status ? NULL : malloc(sizeof *block);
+    if (!status && !block) {
+        status = estimate_refuse_memory(out_frf, out_error);
+    }
+    size_t lines = lines_in_block(recording->used);
+    for (size_t first = 0; first < recording->bin_count && !status; first += lines) {
+        size_t rest = recording->bin_count - first;
+        estimate_block(recording, first, rest < lines ? rest : lines, block, out_frf);
+    }
+    free(block);
     return status ? status : estimate_end(recording, out_frf, out_error);
 }

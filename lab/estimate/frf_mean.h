@@ -3,6 +3,7 @@
 #ifndef SERVOSCOPE_ESTIMATE_FRF_MEAN_H
 #define SERVOSCOPE_ESTIMATE_FRF_MEAN_H
 
+#include "lab/estimate/options.h"
 #include "lab/estimate/periodic.h"
 #include "lab/record/frf_file.h"
 
@@ -21,6 +22,7 @@
 /// Validity:  a line whose mean input could be scatter alone (F test, chance above 1e-3) is not valid
 /// Errors:    error_refused if no line has power in the input, or memory is short; *out_frf is empty then
 /// Test:      tests/unit/test_frf_mean.c
-int frf_mean_estimate(const struct periodic *recording, struct frf *out_frf, struct error *out_error);
+int frf_mean_estimate(const struct periodic *recording, const struct estimate_options *options, struct frf *out_frf,
+                      struct error *out_error);
 
 #endif

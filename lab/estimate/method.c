@@ -2,8 +2,14 @@
 #include "lab/estimate/method.h"
 
 #include "lab/estimate/circle.h"
+#include "lab/estimate/columns.h"
+#include "lab/estimate/frf_h1.h"
 #include "lab/estimate/frf_hann.h"
+#include "lab/estimate/frf_indirect.h"
+#include "lab/estimate/frf_lpm.h"
+#include "lab/estimate/frf_lpm_arbitrary.h"
 #include "lab/estimate/frf_mean.h"
+#include "lab/estimate/parametric_frf.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -12,16 +18,26 @@
 #include <string.h>
 
 const struct estimate_method estimate_methods[] = {
-    {"mean", "mean over periods, variance from their scatter", frf_mean_estimate},
-    {"hann", "Hann window over all periods: robust to what is left of a transient, 1.8 dB more noise",
-     frf_hann_estimate},
-    {NULL, NULL, NULL},
+    {"mean", "mean over periods, variance from their scatter", false, frf_mean_estimate, NULL},
+    {"hann", "Hann window over all periods: robust to what is left of a transient, 1.8 dB more noise", false,
+     frf_hann_estimate, NULL},
+    {"lpm", "local polynomials: takes the transient out, so that no period is left out for settling", true,
+     frf_lpm_estimate, frf_lpm_estimate_arbitrary},
+    {"h1", "cross spectrum over input power, for arbitrary signals; biased in a closed loop", false, frf_h1_estimate,
+     frf_h1_estimate_arbitrary},
+    {"indirect", "output and input against the reference: for arbitrary signals in a closed loop", false,
+     frf_indirect_estimate, frf_indirect_estimate_arbitrary},
+    {"parametric", "transfer function by maximum likelihood, orders chosen by description length", false,
+     frf_parametric_estimate, NULL},
+    {NULL, NULL, false, NULL, NULL},
 };
 
 const double estimate_chance_of_dead_line = 1e-3;
 
-/// Frequencies of two realisations are the same line within this share.
-static const double same_frequency = 1e-9;
+/// Lines of two realisations are the same within this share of their frequency, which clocks and rates derived from a
+/// column of times differ by, and of the distance to the next line.
+static const double same_frequency = 5e-4;
+static const double same_line = 0.1;
 
 const struct estimate_method *estimate_method_find(const char *name, struct error *out_error)
 {
@@ -54,6 +70,16 @@ static const char *unit_of(const char *name)
     return name;
 }
 
+const char *estimate_key(const struct frf *frf, const char *key)
+{
+    for (size_t i = 0; i < frf->key_count; i++) {
+        if (strcmp(frf->keys[i].key, key) == 0) {
+            return frf->keys[i].value;
+        }
+    }
+    return "";
+}
+
 bool estimate_set_key(struct frf *io_frf, const char *key, const char *format, ...)
 {
     char text[512];
@@ -81,32 +107,53 @@ bool estimate_set_key(struct frf *io_frf, const char *key, const char *format, .
     return true;
 }
 
-static int refuse_memory(struct frf *io_frf, struct error *out_error)
+int estimate_refuse_memory(struct frf *io_frf, struct error *out_error)
 {
     frf_free(io_frf);
     return error_set(out_error, error_refused, "not enough memory for the frequency response");
 }
 
-int estimate_begin(const struct periodic *recording, const char *method, double degrees_of_freedom, struct frf *out_frf,
-                   struct error *out_error)
+static int begin(const char *input, const char *output, const char *method, double degrees_of_freedom, size_t lines,
+                 struct frf *out_frf, struct error *out_error)
 {
-    int status = frf_alloc(out_frf, recording->bin_count, out_error);
+    int status = frf_alloc(out_frf, lines, out_error);
     if (status) {
         return status;
     }
     char units[128];
-    snprintf(units, sizeof units, "%s/%s", unit_of(recording->output), unit_of(recording->input));
-    if (!frf_set_text(&out_frf->input, recording->input) || !frf_set_text(&out_frf->output, recording->output) ||
+    snprintf(units, sizeof units, "%s/%s", unit_of(output), unit_of(input));
+    if (!frf_set_text(&out_frf->input, input) || !frf_set_text(&out_frf->output, output) ||
         !frf_set_text(&out_frf->units, units) || !frf_set_text(&out_frf->method, method)) {
-        return refuse_memory(out_frf, out_error);
+        return estimate_refuse_memory(out_frf, out_error);
+    }
+    out_frf->degrees_of_freedom = degrees_of_freedom;
+    return 0;
+}
+
+int estimate_begin(const struct periodic *recording, const char *method, double degrees_of_freedom, struct frf *out_frf,
+                   struct error *out_error)
+{
+    int status = begin(recording->input, recording->output, method, degrees_of_freedom, recording->bin_count, out_frf,
+                       out_error);
+    if (status) {
+        return status;
     }
     out_frf->periods = recording->used;
-    out_frf->degrees_of_freedom = degrees_of_freedom;
     for (size_t line = 0; line < recording->bin_count; line++) {
         out_frf->frequency_hz[line] =
             (double)recording->bins[line] * recording->run->sample_rate_hz / (double)recording->period_samples;
     }
     return 0;
+}
+
+int estimate_begin_arbitrary(const struct arbitrary *recording, const char *method, double degrees_of_freedom,
+                             size_t lines, double step_hz, struct frf *out_frf, struct error *out_error)
+{
+    int status = begin(recording->input, recording->output, method, degrees_of_freedom, lines, out_frf, out_error);
+    for (size_t line = 0; line < lines && !status; line++) {
+        out_frf->frequency_hz[line] = (double)(line + 1) * step_hz;
+    }
+    return status;
 }
 
 void estimate_set_line(struct frf *io_frf, size_t line, double complex response, double std)
@@ -131,6 +178,8 @@ static const char *settle_source_name(enum periodic_settle source)
         return "option";
     case periodic_settle_key:
         return "settle_periods of the run";
+    case periodic_settle_keep:
+        return "nothing: the method models the transient";
     case periodic_settle_auto:
     case periodic_settle_default:
         break;
@@ -171,7 +220,63 @@ int estimate_end(const struct periodic *recording, struct frf *io_frf, struct er
     if (set && recording->lost > 0) {
         set = estimate_set_key(io_frf, "lost_periods", "%zu", recording->lost);
     }
-    return set ? 0 : refuse_memory(io_frf, out_error);
+    return set ? 0 : estimate_refuse_memory(io_frf, out_error);
+}
+
+int estimate_end_arbitrary(const struct arbitrary *recording, struct frf *io_frf, struct error *out_error)
+{
+    if (valid_lines(io_frf) == 0) {
+        frf_free(io_frf);
+        return error_set(out_error, error_refused,
+                         "%s: no line of %s has enough power of its own for a response: expected an excited input, see "
+                         "--input, --reference",
+                         recording->run->path, recording->input);
+    }
+    bool set = set_confidence(io_frf) && estimate_set_key(io_frf, "rows", "%zu", recording->rows) &&
+               estimate_set_key(io_frf, "sample_rate_hz", "%.17g", recording->run->sample_rate_hz);
+    if (set && recording->lost > 0) {
+        set = estimate_set_key(io_frf, "lost_rows", "%zu", recording->lost);
+    }
+    return set ? 0 : estimate_refuse_memory(io_frf, out_error);
+}
+
+bool estimate_warn_of_feedback(const char *reference, struct frf *io_frf)
+{
+    const struct columns columns = {.reference = reference};
+    if (columns_closed_loop(&columns)) {
+        return estimate_set_key(io_frf, "warning",
+                                "biased: the recording holds %s, so a loop is closed, and dividing by the power of %s "
+                                "draws the response towards minus the inverse of the controller; use method indirect",
+                                reference, io_frf->input);
+    }
+    return estimate_set_key(io_frf, "warning",
+                            "biased if a loop is closed around %s or if its sensor is noisy: noise counts as input "
+                            "power; use method indirect then, or a periodic excitation",
+                            io_frf->input);
+}
+
+bool estimate_warn_of_reference(const char *reference, struct frf *io_frf)
+{
+    if (strcmp(reference, "torque_ref_Nm") != 0 && strcmp(reference, "force_ref_N") != 0) {
+        return true;
+    }
+    return estimate_set_key(io_frf, "warning",
+                            "%s is what the controller asks for: it excites from outside only if no loop is closed "
+                            "around it",
+                            reference);
+}
+
+static double tolerance_of_line(const struct frf *frf, size_t line)
+{
+    const double *frequency = frf->frequency_hz;
+    double tolerance = same_frequency * frequency[line];
+    if (line > 0) {
+        tolerance = fmin(tolerance, same_line * (frequency[line] - frequency[line - 1]));
+    }
+    if (line + 1 < frf->count) {
+        tolerance = fmin(tolerance, same_line * (frequency[line + 1] - frequency[line]));
+    }
+    return tolerance;
 }
 
 static int check_same(const struct frf *first, const struct frf *other, size_t number, struct error *out_error)
@@ -186,13 +291,27 @@ static int check_same(const struct frf *first, const struct frf *other, size_t n
     }
     for (size_t line = 0; line < first->count; line++) {
         double frequency = first->frequency_hz[line];
-        if (!(fabs(other->frequency_hz[line] - frequency) <= same_frequency * frequency)) {
+        if (!(fabs(other->frequency_hz[line] - frequency) <= tolerance_of_line(first, line))) {
             return error_set(out_error, error_refused,
                              "run %zu: line %zu is at %.9g Hz: expected the first run's %.9g Hz", number, line + 1,
                              other->frequency_hz[line], frequency);
         }
     }
     return 0;
+}
+
+/// Root of the mean power of the levels; unknown if one realisation does not know its own.
+static double average_level(const struct frf *realisations, size_t count, size_t line, bool odd)
+{
+    double sum = 0.0;
+    for (size_t r = 0; r < count; r++) {
+        const double *levels = odd ? realisations[r].odd_distortion : realisations[r].even_distortion;
+        if (!frf_known(levels[line])) {
+            return FRF_UNKNOWN;
+        }
+        sum += levels[line] * levels[line] / (double)count;
+    }
+    return sqrt(sum);
 }
 
 static void average_line(const struct frf *realisations, size_t count, size_t line, struct frf *io_frf)
@@ -214,6 +333,8 @@ static void average_line(const struct frf *realisations, size_t count, size_t li
     if (valid) {
         estimate_set_line(io_frf, line, mean, sqrt(scatter / ((double)count * (double)(count - 1))));
         io_frf->noise_std[line] = sqrt(noise_power) / (double)count;
+        io_frf->odd_distortion[line] = average_level(realisations, count, line, true);
+        io_frf->even_distortion[line] = average_level(realisations, count, line, false);
     }
 }
 
@@ -236,18 +357,21 @@ int estimate_average(const struct frf *realisations, size_t count, struct frf *o
     }
     if (!frf_set_text(&out_frf->input, first->input) || !frf_set_text(&out_frf->output, first->output) ||
         !frf_set_text(&out_frf->units, first->units) || !frf_set_text(&out_frf->method, first->method)) {
-        return refuse_memory(out_frf, out_error);
+        return estimate_refuse_memory(out_frf, out_error);
     }
+    double noise_degrees = 0.0;
     for (size_t r = 0; r < count; r++) {
         out_frf->periods += realisations[r].periods;
+        noise_degrees += realisations[r].degrees_of_freedom;
     }
     out_frf->degrees_of_freedom = 2.0 * (double)(count - 1);
     memcpy(out_frf->frequency_hz, first->frequency_hz, first->count * sizeof *out_frf->frequency_hz);
     for (size_t line = 0; line < first->count; line++) {
         average_line(realisations, count, line, out_frf);
     }
-    if (!set_confidence(out_frf) || !estimate_set_key(out_frf, "realisations", "%zu", count)) {
-        return refuse_memory(out_frf, out_error);
+    if (!set_confidence(out_frf) || !estimate_set_key(out_frf, "realisations", "%zu", count) ||
+        !estimate_set_key(out_frf, "noise_degrees_of_freedom", "%.6g", noise_degrees)) {
+        return estimate_refuse_memory(out_frf, out_error);
     }
     return 0;
 }

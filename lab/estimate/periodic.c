@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/periodic.h"
 
+#include "lab/estimate/columns.h"
 #include "lab/estimate/period_search.h"
 #include "lab/estimate/spectra.h"
 
@@ -10,54 +11,10 @@
 
 static const double two_pi = 6.283185307179586476925;
 
-static const char *const usual_inputs[] = {"torque_Nm", "force_N", "current_A", "voltage_V", NULL};
-static const char *const usual_outputs[] = {"velocity_rad_per_s", "velocity_m_per_s", "position_rad", "position_m",
-                                            NULL};
-
 static int refuse_memory(const struct run *run, struct error *out_error)
 {
     return error_set(out_error, error_refused, "%s: not enough memory for the spectra of %zu rows", run->path,
                      run->rows);
-}
-
-/// The run's own spelling of a column name, so that the result does not borrow from the caller.
-static const char *own_name(const struct run *run, const char *name)
-{
-    for (size_t c = 0; c < run->column_count; c++) {
-        if (strcmp(run->columns[c].name, name) == 0) {
-            return run->columns[c].name;
-        }
-    }
-    return NULL;
-}
-
-static int choose_column(const struct run *run, const char *what, const char *wanted, const char *const *usual,
-                         const char **out_name, struct error *out_error)
-{
-    *out_name = wanted ? own_name(run, wanted) : NULL;
-    for (size_t i = 0; !wanted && !*out_name && usual[i]; i++) {
-        *out_name = own_name(run, usual[i]);
-    }
-    if (*out_name) {
-        return 0;
-    }
-    if (wanted) {
-        return error_set(out_error, error_refused, "%s: no column '%s' to take as the %s", run->path, wanted, what);
-    }
-    return error_set(out_error, error_refused, "%s: no %s column: expected %s, %s, %s or %s, or --%s COLUMN", run->path,
-                     what, usual[0], usual[1], usual[2], usual[3], what);
-}
-
-static bool finite_column(const struct run *run, const char *name, struct error *out_error)
-{
-    const double *values = run_column(run, name);
-    for (size_t n = 0; n < run->rows; n++) {
-        if (!isfinite(values[n])) {
-            error_set(out_error, error_refused, "%s: row %zu of %s is not a finite number", run->path, n + 1, name);
-            return false;
-        }
-    }
-    return true;
 }
 
 static int choose_period(struct periodic *self, size_t wanted, struct error *out_error)
@@ -74,15 +31,19 @@ static int choose_period(struct periodic *self, size_t wanted, struct error *out
         self->period_found = true;
         return 0;
     case period_search_err_fraction:
+        self->aperiodic = true;
         return error_set(
             out_error, error_refused,
             "%s: %s repeats every %.3f samples, which is no whole number of samples: resample the recording, or "
-            "say --period SAMPLES if you know better",
+            "say --period SAMPLES if you know better, or --method lpm, h1 or indirect, which need no period",
             run->path, self->input, found.exact_samples);
     case period_search_err_none:
-        return error_set(out_error, error_refused,
-                         "%s: the file has no key period_samples, and %s does not repeat itself: say --period SAMPLES",
-                         run->path, self->input);
+        self->aperiodic = true;
+        return error_set(
+            out_error, error_refused,
+            "%s: the file has no key period_samples, and %s does not repeat itself: say --period SAMPLES, or "
+            "--method lpm, h1 or indirect, which need none",
+            run->path, self->input);
     case period_search_err_memory:
         break;
     }
@@ -161,17 +122,9 @@ static int choose_bins(struct periodic *self, const struct periodic_options *opt
     return 0;
 }
 
-/// Row of the first lost sample of a period, counted from 1; 0 if it has none.
 static size_t first_lost_row_of(const struct periodic *self, size_t period)
 {
-    const double *valid = run_column(self->run, "valid");
-    for (size_t n = 0; valid && n < self->period_samples; n++) {
-        size_t row = period * self->period_samples + n;
-        if (!(valid[row] > 0.5)) {
-            return row + 1;
-        }
-    }
-    return 0;
+    return columns_first_lost_row(self->run, period * self->period_samples, self->period_samples);
 }
 
 static int measure_settling(struct periodic *self, const bool *usable, struct error *out_error)
@@ -196,8 +149,11 @@ static int measure_settling(struct periodic *self, const bool *usable, struct er
 static void choose_settle(struct periodic *self, const struct periodic_options *options)
 {
     self->settle_source = options->settle;
-    if (options->settle == periodic_settle_default) {
-        self->settle_source = self->run->has_settle_periods ? periodic_settle_key : periodic_settle_auto;
+    if (options->settle == periodic_settle_default || options->settle == periodic_settle_keep) {
+        bool keep = options->settle == periodic_settle_keep;
+        self->settle_source = self->run->has_settle_periods ? periodic_settle_key
+                              : keep                        ? periodic_settle_keep
+                                                            : periodic_settle_auto;
     }
     switch (self->settle_source) {
     case periodic_settle_given:
@@ -205,6 +161,9 @@ static void choose_settle(struct periodic *self, const struct periodic_options *
         break;
     case periodic_settle_key:
         self->settle = self->run->settle_periods;
+        break;
+    case periodic_settle_keep:
+        self->settle = 0;
         break;
     case periodic_settle_auto:
     case periodic_settle_default:
@@ -237,20 +196,18 @@ static int select_periods(struct periodic *self, const bool *usable, struct erro
         self->run->path, self->used, self->total, self->settle < self->total ? self->settle : self->total, self->lost);
 }
 
-/// Moves the spectra of the periods that count to the front.
-static void keep_used(const struct periodic *self, double complex *io_spectra)
+/// Where the spectra of the periods that count begin; gaps among them are closed.
+static double complex *keep_used(const struct periodic *self, double complex *io_spectra)
 {
-    for (size_t i = 0; i < self->used; i++) {
-        memmove(io_spectra + i * self->bin_count, io_spectra + self->used_periods[i] * self->bin_count,
-                self->bin_count * sizeof *io_spectra);
+    double complex *first = io_spectra + self->used_periods[0] * self->bin_count;
+    for (size_t i = 1; i < self->used; i++) {
+        double complex *from = io_spectra + self->used_periods[i] * self->bin_count;
+        double complex *to = first + i * self->bin_count;
+        if (to != from) {
+            memmove(to, from, self->bin_count * sizeof *to);
+        }
     }
-}
-
-static bool ends_with(const char *text, const char *end)
-{
-    size_t length = strlen(text);
-    size_t end_length = strlen(end);
-    return length >= end_length && strcmp(text + length - end_length, end) == 0;
+    return first;
 }
 
 /// Slope of the line through the means of the periods that count.
@@ -280,7 +237,7 @@ static double slope_of_means(const struct periodic *self, const double *signal)
 /// (exp(-jw) - 1).
 static void take_out_trend(struct periodic *self)
 {
-    if (!ends_with(self->output, "_rad") && !ends_with(self->output, "_m")) {
+    if (!columns_is_position(self->output)) {
         return;
     }
     double length = (double)self->period_samples;
@@ -299,13 +256,13 @@ static int transform_and_select(struct periodic *self, const struct periodic_opt
     size_t size = self->total * self->bin_count;
     self->input_spectra = malloc(size * sizeof *self->input_spectra);
     self->output_spectra = malloc(size * sizeof *self->output_spectra);
+    self->owned_spectra[0] = self->input_spectra;
+    self->owned_spectra[1] = self->output_spectra;
     bool *usable = malloc(self->total * sizeof *usable);
     int status = 0;
     if (!self->input_spectra || !self->output_spectra || !usable ||
-        !spectra_transform_periods(run_column(run, self->input), self->period_samples, self->total, self->bins,
-                                   self->bin_count, self->input_spectra) ||
-        !spectra_transform_periods(run_column(run, self->output), self->period_samples, self->total, self->bins,
-                                   self->bin_count, self->output_spectra)) {
+        !spectra_transform_both(run_column(run, self->input), run_column(run, self->output), self->period_samples,
+                                self->total, self->bins, self->bin_count, self->input_spectra, self->output_spectra)) {
         status = refuse_memory(run, out_error);
     }
     for (size_t p = 0; p < self->total && !status; p++) {
@@ -318,45 +275,48 @@ static int transform_and_select(struct periodic *self, const struct periodic_opt
     }
     free(usable);
     if (!status) {
-        keep_used(self, self->input_spectra);
-        keep_used(self, self->output_spectra);
+        self->input_spectra = keep_used(self, self->input_spectra);
+        self->output_spectra = keep_used(self, self->output_spectra);
         take_out_trend(self);
     }
     return status;
 }
 
-static int check_output(const struct run *run, const char *output, struct error *out_error)
-{
-    const double *values = run_column(run, output);
-    for (size_t n = 1; n < run->rows; n++) {
-        if (values[n] != values[0]) {
-            return 0;
-        }
-    }
-    return error_set(out_error, error_refused, "%s: %s does not change: expected an axis that moves, see --output",
-                     run->path, output);
-}
-
 int periodic_cut(const struct run *run, const struct periodic_options *options, struct periodic *out_self,
                  struct error *out_error)
 {
+    struct columns columns;
+    const struct columns wanted = {options->input, options->output, options->reference};
     *out_self = (struct periodic){.run = run};
-    int status = choose_column(run, "input", options->input, usual_inputs, &out_self->input, out_error);
-    status =
-        status ? status : choose_column(run, "output", options->output, usual_outputs, &out_self->output, out_error);
-    if (!status &&
-        !(finite_column(run, out_self->input, out_error) && finite_column(run, out_self->output, out_error))) {
-        status = error_refused;
+    int status = columns_choose(run, &wanted, &columns, out_error);
+    if (status) {
+        return status;
     }
-    status = status ? status : check_output(run, out_self->output, out_error);
-    status = status ? status : choose_period(out_self, options->period_samples, out_error);
+    out_self->input = columns.input;
+    out_self->output = columns.output;
+    out_self->reference = columns.reference;
+    status = choose_period(out_self, options->period_samples, out_error);
     status = status ? status : count_periods(out_self, out_error);
     status = status ? status : choose_bins(out_self, options, out_error);
     status = status ? status : transform_and_select(out_self, options, out_error);
     if (status) {
+        bool aperiodic = out_self->aperiodic;
         periodic_free(out_self);
+        out_self->aperiodic = aperiodic;
     }
     return status;
+}
+
+bool periodic_transform_used(const struct periodic *self, const char *column, double complex *out_spectra)
+{
+    const double *signal = run_column(self->run, column);
+    for (size_t i = 0; i < self->used; i++) {
+        if (!spectra_transform_periods(signal + self->used_periods[i] * self->period_samples, self->period_samples, 1,
+                                       self->bins, self->bin_count, out_spectra + i * self->bin_count)) {
+            return false;
+        }
+    }
+    return true;
 }
 
 void periodic_free(struct periodic *self)
@@ -365,7 +325,7 @@ void periodic_free(struct periodic *self)
     free(self->used_periods);
     free(self->input_level);
     free(self->output_level);
-    free(self->input_spectra);
-    free(self->output_spectra);
+    free(self->owned_spectra[0]);
+    free(self->owned_spectra[1]);
     *self = (struct periodic){0};
 }

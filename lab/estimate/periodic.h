@@ -19,11 +19,13 @@ enum periodic_settle {
     periodic_settle_auto,    ///< from the decay
     periodic_settle_given,   ///< as an option: `settle_periods` below; as a result: the caller said so
     periodic_settle_key,     ///< as a result: the run's key
+    periodic_settle_keep,    ///< as an option: the run's key, else none, for methods that model the transient
 };
 
 struct periodic_options {
-    const char *input;  ///< column; NULL: torque_Nm, else force_N, current_A, voltage_V, the first there is
-    const char *output; ///< column; NULL: velocity_rad_per_s, velocity_m_per_s, position_rad, position_m
+    const char *input;     ///< column; NULL: torque_Nm, else force_N, current_A, voltage_V, the first there is
+    const char *output;    ///< column; NULL: velocity_rad_per_s, velocity_m_per_s, position_rad, position_m
+    const char *reference; ///< column; NULL: columns_choose says which
     enum periodic_settle settle;
     size_t settle_periods; ///< with periodic_settle_given
     size_t period_samples; ///< 0: the run's, else found in the input
@@ -35,6 +37,8 @@ struct periodic {
     const struct run *run; ///< borrowed
     const char *input;     ///< column names, owned by the run
     const char *output;
+    const char *reference; ///< NULL: none
+    bool aperiodic;        ///< refused because nothing says a period and none was found; kept when a cut is refused
     size_t period_samples;
     bool period_found; ///< by its repetition, not said
     size_t bin_count;
@@ -53,6 +57,7 @@ struct periodic {
     double *output_level;
     double complex *input_spectra; ///< used x bin_count (spectra.h)
     double complex *output_spectra;
+    double complex *owned_spectra[2]; ///< what the two above point into
 };
 
 /// Cuts a run into periods and transforms those that count.
@@ -65,6 +70,10 @@ struct periodic {
 /// Test:   tests/unit/test_frf_mean.c, tests/fault/test_frf_refusals.c
 int periodic_cut(const struct run *run, const struct periodic_options *options, struct periodic *out_self,
                  struct error *out_error);
+
+/// Transforms the periods that count of another column; out_spectra: used x bin_count. Errors: false if memory is
+/// short.
+bool periodic_transform_used(const struct periodic *self, const char *column, double complex *out_spectra);
 
 void periodic_free(struct periodic *self);
 

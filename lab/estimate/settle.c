@@ -5,12 +5,16 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { fewest_periods = 4 };
 
 static const double chance_of_false_alarm = 1e-3;
 /// Rounding leaves scatter of about this share of a line's power; below it a deviation means nothing.
 static const double rounding_power = 1e-28;
+/// Products of 1 + F/dof stay below the largest double; a deviation beyond the factor is beyond chance anyhow.
+static const double largest_product = 1e100;
+static const double largest_factor = 1e90;
 /// A transient is measured where its power is this many times the scatter's.
 static const double measurable = 4.0;
 
@@ -19,53 +23,92 @@ static double power(double complex z)
     return creal(z) * creal(z) + cimag(z) * cimag(z);
 }
 
-/// The usable periods of the later half: what a settled period looks like on one line.
+/// Lines are judged in blocks whose values of all periods stay in the second cache while they are passed over thrice.
+enum { block_lines = 512, block_values = 16384, fewest_block_lines = 16 };
+
+static size_t lines_in_block(size_t periods)
+{
+    size_t lines = block_values / periods;
+    return lines > block_lines ? block_lines : lines < fewest_block_lines ? fewest_block_lines : lines;
+}
+
+/// The usable periods of the later half: what a settled period looks like, line by line.
 struct reference {
-    size_t count;
-    double complex mean;
-    double variance;
+    double complex mean[block_lines];
+    double scale[block_lines]; ///< 1 / ((1 + 1/M) variance dof); 0 without scatter
 };
 
-static struct reference later_half(const double complex *spectra, size_t periods, size_t bin_count, const bool *usable,
-                                   size_t bin)
-{
-    struct reference self = {0};
-    for (size_t p = periods / 2; p < periods; p++) {
-        if (usable[p]) {
-            self.mean += spectra[p * bin_count + bin];
-            self.count++;
-        }
-    }
-    self.mean /= self.count > 0 ? (double)self.count : 1.0;
-    for (size_t p = periods / 2; p < periods && self.count > 1; p++) {
-        if (usable[p]) {
-            self.variance += power(spectra[p * bin_count + bin] - self.mean) / (double)(self.count - 1);
-        }
-    }
-    self.variance += rounding_power * power(self.mean);
-    return self;
-}
+/// All lines together.
+struct totals {
+    size_t count;   ///< M, usable periods of the later half
+    double signal;  ///< |Ybar|^2
+    double scatter; ///< of what a settled period deviates from it
+};
 
 /// Everything about one period against the later half, summed over lines.
 struct comparison {
     double log_chance; ///< log P
     double deviation;  ///< |Y_p - Ybar|^2
-    double scatter;    ///< what that is without a transient
-    double signal;     ///< |Ybar|^2
 };
 
-static void compare_line(const double complex *spectra, size_t periods, size_t bin_count, const struct reference *line,
-                         size_t bin, struct comparison *io_periods)
+/// What a line's settled periods are expected to deviate by, from the sum of their squares.
+static double expected_deviation(double scatter, double complex mean, double count)
 {
-    double expected = line->variance * (1.0 + 1.0 / (double)line->count);
-    double dof = (double)line->count - 1.0;
-    for (size_t p = 0; p < periods; p++) {
-        double deviation = power(spectra[p * bin_count + bin] - line->mean);
-        io_periods[p].log_chance -= expected > 0.0 ? dof * log1p(deviation / expected / dof) : 0.0;
-        io_periods[p].deviation += deviation;
-        io_periods[p].scatter += expected;
-        io_periods[p].signal += power(line->mean);
+    return (scatter / (count - 1.0) + rounding_power * power(mean)) * (1.0 + 1.0 / count);
+}
+
+/// `spectra` begins at the block's first line.
+static void make_reference(const double complex *spectra, size_t periods, size_t bin_count, size_t lines,
+                           const bool *usable, struct totals *io_totals, struct reference *out)
+{
+    memset(out, 0, sizeof *out);
+    for (size_t p = periods / 2; p < periods; p++) {
+        for (size_t b = 0; b < lines && usable[p]; b++) {
+            out->mean[b] += spectra[p * bin_count + b];
+        }
     }
+    for (size_t b = 0; b < lines; b++) {
+        out->mean[b] /= (double)io_totals->count;
+    }
+    for (size_t p = periods / 2; p < periods; p++) {
+        for (size_t b = 0; b < lines && usable[p]; b++) {
+            out->scale[b] += power(spectra[p * bin_count + b] - out->mean[b]);
+        }
+    }
+    for (size_t b = 0; b < lines; b++) {
+        double dof = (double)(io_totals->count - 1);
+        double expected = expected_deviation(out->scale[b], out->mean[b], (double)io_totals->count);
+        out->scale[b] = expected > 0.0 ? 1.0 / (expected * dof) : 0.0;
+        io_totals->signal += power(out->mean[b]);
+        io_totals->scatter += expected;
+    }
+}
+
+/// 1 + F/dof of one line.
+static double chance_factor(double deviation, double scale)
+{
+    double ratio = deviation * scale;
+    return 1.0 + (ratio < largest_factor ? ratio : largest_factor);
+}
+
+static void compare_period(const double complex *spectra, size_t lines, const struct reference *reference, double dof,
+                           struct comparison *io_period)
+{
+    /* A logarithm of a product now and then in place of one for each line: most of the time went there. Two lines a
+     * step, because each multiplication waits for the one before. */
+    double product = 1.0;
+    for (size_t b = 0; b < lines; b += 2) {
+        size_t next = b + 1 < lines ? b + 1 : b;
+        double deviation = power(spectra[b] - reference->mean[b]);
+        double other = next > b ? power(spectra[next] - reference->mean[next]) : 0.0;
+        product *= chance_factor(deviation, reference->scale[b]) * chance_factor(other, reference->scale[next]);
+        if (product > largest_product) {
+            io_period->log_chance -= dof * log(product);
+            product = 1.0;
+        }
+        io_period->deviation += deviation + other;
+    }
+    io_period->log_chance -= dof * log(product);
 }
 
 static bool is_unsettled(const struct comparison *period, size_t bin_count)
@@ -73,16 +116,16 @@ static bool is_unsettled(const struct comparison *period, size_t bin_count)
     return statistics_chi2_tail(-2.0 * period->log_chance, 2.0 * (double)bin_count) < chance_of_false_alarm;
 }
 
-static void judge(const struct comparison *compared, size_t periods, size_t bin_count, const bool *usable,
-                  struct settle *out_settle, double *out_level)
+static void judge(const struct comparison *compared, const struct totals *totals, size_t periods, size_t bin_count,
+                  const bool *usable, struct settle *out_settle, double *out_level)
 {
     double excess[2] = {0.0, 0.0};
     bool leading = true;
     for (size_t p = 0; p < periods; p++) {
         const struct comparison *period = &compared[p];
-        out_level[p] = period->signal > 0.0 ? sqrt(period->deviation / period->signal) : 0.0;
-        if (p < 2 && usable[p] && period->deviation > measurable * period->scatter) {
-            excess[p] = period->deviation - period->scatter;
+        out_level[p] = totals->signal > 0.0 ? sqrt(period->deviation / totals->signal) : 0.0;
+        if (p < 2 && usable[p] && period->deviation > measurable * totals->scatter) {
+            excess[p] = period->deviation - totals->scatter;
         }
         leading = leading && p < periods / 2 && (!usable[p] || is_unsettled(period, bin_count));
         out_settle->periods += leading;
@@ -96,24 +139,56 @@ static void judge(const struct comparison *compared, size_t periods, size_t bin_
 bool settle_measure(const double complex *spectra, size_t periods, size_t bin_count, const bool *usable,
                     struct settle *out_settle, double *out_level)
 {
+    struct totals totals = {0};
     *out_settle = (struct settle){0};
-    size_t usable_late = 0;
     for (size_t p = 0; p < periods; p++) {
         out_level[p] = 0.0;
-        usable_late += p >= periods / 2 && usable[p];
+        totals.count += p >= periods / 2 && usable[p];
     }
-    if (periods < fewest_periods || usable_late < 2 || bin_count == 0) {
+    if (periods < fewest_periods || totals.count < 2 || bin_count == 0) {
         return true;
     }
+    struct reference *reference = malloc(sizeof *reference);
     struct comparison *compared = calloc(periods, sizeof *compared);
-    if (!compared) {
-        return false;
+    bool done = reference && compared;
+    size_t block = lines_in_block(periods);
+    for (size_t first = 0; first < bin_count && done; first += block) {
+        size_t lines = bin_count - first < block ? bin_count - first : block;
+        make_reference(spectra + first, periods, bin_count, lines, usable, &totals, reference);
+        for (size_t p = 0; p < periods; p++) {
+            compare_period(spectra + p * bin_count + first, lines, reference, (double)(totals.count - 1), &compared[p]);
+        }
     }
-    for (size_t b = 0; b < bin_count; b++) {
-        struct reference line = later_half(spectra, periods, bin_count, usable, b);
-        compare_line(spectra, periods, bin_count, &line, b, compared);
+    if (done) {
+        judge(compared, &totals, periods, bin_count, usable, out_settle, out_level);
     }
-    judge(compared, periods, bin_count, usable, out_settle, out_level);
+    free(reference);
     free(compared);
-    return true;
+    return done;
+}
+
+bool settle_differs(const double complex *period, const struct settle_reference *reference, double *out_level,
+                    double *out_excess)
+{
+    const double count = (double)reference->count;
+    struct comparison compared = {0.0, 0.0};
+    double signal = 0.0;
+    double scatter = 0.0;
+    double product = 1.0;
+    for (size_t b = 0; b < reference->bin_count; b++) {
+        const double expected = expected_deviation(reference->scatter[b], reference->mean[b], count);
+        const double deviation = power(period[b] - reference->mean[b]);
+        product *= chance_factor(deviation, expected > 0.0 ? 1.0 / (expected * (count - 1.0)) : 0.0);
+        if (product > largest_product) {
+            compared.log_chance -= (count - 1.0) * log(product);
+            product = 1.0;
+        }
+        compared.deviation += deviation;
+        signal += power(reference->mean[b]);
+        scatter += expected;
+    }
+    compared.log_chance -= (count - 1.0) * log(product);
+    *out_level = signal > 0.0 ? sqrt(compared.deviation / signal) : 0.0;
+    *out_excess = compared.deviation > measurable * scatter ? compared.deviation - scatter : 0.0;
+    return is_unsettled(&compared, reference->bin_count);
 }

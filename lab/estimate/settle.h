@@ -26,4 +26,18 @@ struct settle {
 bool settle_measure(const double complex *spectra, size_t periods, size_t bin_count, const bool *usable,
                     struct settle *out_settle, double *out_level);
 
+/// What settled periods look like, where they have been summed up rather than kept.
+struct settle_reference {
+    size_t count; ///< at least 2
+    size_t bin_count;
+    const double complex *mean; ///< bin_count
+    const double *scatter;      ///< bin_count: sum |Y_m - mean|^2
+};
+
+/// Compares one period, which is none of the reference's, with it: the same test. Returns whether it differs;
+/// *out_level and *out_excess: its deviation over the signal, and what of its power is above scatter (0: too small to
+/// be measured).
+bool settle_differs(const double complex *period, const struct settle_reference *reference, double *out_level,
+                    double *out_excess);
+
 #endif

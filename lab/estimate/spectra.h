@@ -19,8 +19,20 @@
 bool spectra_transform_periods(const double *signal, size_t period_samples, size_t periods, const uint32_t *bins,
                                size_t bin_count, double complex *out_spectra);
 
-/// Transforms the same at every bin from 0 to period_samples/2; out_spectra: periods x (period_samples/2 + 1).
+/// Transforms the periods of two signals at the same bins, a period of one beside that of the other where an FFT pays.
+/// Shapes: first, second: periods x period_samples; out_first, out_second: periods x bin_count, period-major
+bool spectra_transform_both(const double *first, const double *second, size_t period_samples, size_t periods,
+                            const uint32_t *bins, size_t bin_count, double complex *out_first,
+                            double complex *out_second);
+
+/// Transforms one signal at every bin from 0 to period_samples/2; out_spectra: periods x (period_samples/2 + 1).
 bool spectra_transform_all(const double *signal, size_t period_samples, size_t periods, double complex *out_spectra);
+
+/// Transforms two real signals of `rows` samples at every bin from 0 to rows/2, in the time of one complex transform.
+/// Shapes: first, second: rows; out_first, out_second: rows/2 + 1
+/// Errors: false if memory is short
+bool spectra_transform_two(const double *first, const double *second, size_t rows, double complex *out_first,
+                           double complex *out_second);
 
 /// Tells whether an FFT of this length beats a direct sum over bin_count bins. KissFFT costs about N times the sum of
 /// the length's prime factors, so that a prime length is cheaper by the sum unless most bins are wanted.

@@ -116,7 +116,7 @@ static double coverage(enum drive_mode mode, const char *method)
         model.seed = (uint64_t)seed;
         simulate(mode, &run);
         TEST_ASSERT_EQUAL_INT(0, periodic_cut(&run, &(struct periodic_options){0}, &recording, &error));
-        TEST_ASSERT_EQUAL_INT(0, estimate_method_find(method, &error)->estimate(&recording, &frf, &error));
+        TEST_ASSERT_EQUAL_INT(0, estimate_method_find(method, &error)->estimate(&recording, NULL, &frf, &error));
         double factor = circle_confidence_factor(0.95, frf.degrees_of_freedom / 2.0);
         TEST_ASSERT_EQUAL_size_t(lines, frf.count);
         for (size_t line = 0; line < lines; line++) {
@@ -154,7 +154,7 @@ static void test_simulate_frf_is_exact_without_noise(void)
     model.sensors.torque_noise_Nm = 0.0;
     simulate(drive_mode_cascade, &run);
     TEST_ASSERT_EQUAL_INT(0, periodic_cut(&run, &(struct periodic_options){0}, &recording, &error));
-    TEST_ASSERT_EQUAL_INT(0, estimate_methods[0].estimate(&recording, &frf, &error));
+    TEST_ASSERT_EQUAL_INT(0, estimate_methods[0].estimate(&recording, NULL, &frf, &error));
     for (size_t line = 0; line < lines; line++) {
         double complex expected = truth(frf.frequency_hz[line]);
         double complex estimate = frf.real[line] + frf.imag[line] * I;

@@ -62,11 +62,14 @@ refuse 2 "x.csv: would be overwritten" "${grid[@]}" --lines list:x.csv "${axis[@
 refuse 1 "nowhere/r.html: cannot be written" "${all[@]}" --report nowhere/r.html
 
 # Words
-refuse 2 "method: 'magic', expected one of fast, mca, clip" "${all[@]}" --method magic
+refuse 2 "method: 'magic', expected one of fast, mca, linf, clip" "${all[@]}" --method magic
 refuse 2 "--grid: 'both', expected continuous or samples" "${all[@]}" --grid both
 refuse 2 "--start: 'middle', expected paper or none" "${all[@]}" --start middle
-refuse 2 "--start: 'bank' is not available yet" "${all[@]}" --start bank
-refuse 2 "--start: 'model:m.json' is not available yet" "${all[@]}" --start model:m.json
+refuse 1 "m.json: cannot be read" "${all[@]}" --start model:m.json
+refuse 2 "--start: 'model:', expected" "${all[@]}" --start model:
+refuse 2 "--mode: 'speed', expected cascade or torque" "${all[@]}" --mode speed
+refuse 2 "--amplitude-tolerance: 1 is for --method fast" "${all[@]}" --method mca --amplitude-tolerance 1
+refuse 2 "--time-budget: 1 is for --method fast" "${all[@]}" --method mca --time-budget 1
 refuse 2 "--keep: 'some', expected all or acceleration" "${all[@]}" --method clip --keep some
 refuse 2 "--keep: 'all' is for --method clip" "${all[@]}" --keep all
 refuse 2 "--starts: 3 is for --method fast" "${all[@]}" --method mca --starts 3
@@ -75,8 +78,6 @@ refuse 2 "--starts: 3 is for --method fast" "${all[@]}" --method mca --starts 3
 refuse 2 'half the rate is 500 Hz' "${grid[@]}" --lines linear:0.5:500:0.5 "${axis[@]}" --out x
 refuse 2 "is not on the period's grid of 0.5 Hz" "${grid[@]}" --lines linear:0.7:100:0.5 "${axis[@]}" --out x
 refuse 2 'no line is left' "${grid[@]}" --lines odd:2:2.4:1 "${axis[@]}" --out x
-refuse 2 'not available yet' "${grid[@]}" --lines octaves:1:100:1 "${axis[@]}" --out x
-refuse 2 'not available yet' "${grid[@]}" --lines dwell:1:100:1 "${axis[@]}" --out x
 printf '1\n2\nthree\n' >list.txt
 refuse 1 "list.txt:3: 'three' is not a number" "${grid[@]}" --lines list:list.txt "${axis[@]}" --out x
 refuse 1 'missing.txt: cannot be opened' "${grid[@]}" --lines list:missing.txt "${axis[@]}" --out x
@@ -85,6 +86,13 @@ refuse 1 'missing.txt: cannot be opened' "${grid[@]}" --lines list:missing.txt "
 refuse 2 'rotary and linear limits are mixed' "${all[@]}" --limit-velocity-m-per-s 1
 refuse 2 '--inertia and --mass are both given' "${all[@]}" --mass 1 --pulley-radius 0.1
 refuse 1 'nowhere' "${grid[@]}" "${lines[@]}" "${axis[@]}" --out nowhere/x
+
+# What is played under the multisine, what is asked of it
+refuse 2 "--stroke: '0.5', expected AMPLITUDE:PERIODS" "${all[@]}" --stroke 0.5
+refuse 2 "--stroke-m is of a linear axis" "${all[@]}" --stroke-m 0.1:4
+refuse 1 "which leaves nothing for the multisine" "${all[@]}" --limit-velocity 2 --bias-velocity 3
+refuse 1 "expected at least 2 Nm" "${all[@]}" --minimum-effective 2
+refuse 2 "--stroke is for a single table" "${grid[@]}" --lines octaves:1:100:1 "${axis[@]}" --stroke 0.5:4 --out x
 
 # What is written
 "$SERVOSCOPE" design "${all[@]}" >out 2>err

@@ -36,6 +36,55 @@ assert said["method"] == "hann" and said["runs"][0]["settle_periods"] == 2 and s
 "$SERVOSCOPE" frf run1.csv --settle auto --out frf.csv --quiet || fail "--settle auto"
 grep -qx '# settle_from: decay of the transient' frf.csv || fail "$(grep settle frf.csv)"
 
+# The local polynomials leave no period out, say which order they took, and the advice is a sentence.
+grep -v '^# settle_periods' run1.csv >keyless.csv
+"$SERVOSCOPE" frf keyless.csv --method lpm --out frf.csv >said
+grep -q '6 of 6 periods of 500 samples count, 0 left out for settling' said || fail "$(cat said)"
+grep -q 'polynomials of order .* lines on each side' said || fail "$(cat said)"
+grep -q 'method .* suits this recording: it repeats every 500 samples' said || fail "$(cat said)"
+grep -qx '# settle_from: nothing: the method models the transient' frf.csv || fail "$(grep settle frf.csv)"
+"$SERVOSCOPE" frf run1.csv --method lpm --order 2 --half-width 8 --json --out frf.csv >said
+python3 -c '
+import json
+said = json.load(open("said"))
+assert said["lpm_order"] == "2" and said["lpm_half_width"] == "8" and said["degrees_of_freedom"] == 26, said
+assert "suits this recording" in said["advice"] and said["suited_method"] in ("mean", "lpm"), said
+' || fail "--json of lpm: $(cat said)"
+
+# h1 warns, indirect goes through the reference; both have a coherence. Without a period they use segments.
+"$SERVOSCOPE" frf run1.csv --method h1 --json --out frf.csv >said
+python3 -c '
+import json
+said = json.load(open("said"))
+assert "biased" in said["warning"] and 0.5 < said["median_coherence"] <= 1, said
+' || fail "--json of h1: $(cat said)"
+grep -q '^frequency_hz,.*,valid,coherence$' frf.csv || fail "$(grep frequency_hz frf.csv)"
+"$SERVOSCOPE" frf run1.csv --method indirect --reference torque_ref_Nm --out frf.csv --quiet
+grep -qx '# reference: torque_ref_Nm' frf.csv || fail "$(grep reference frf.csv)"
+python3 -c '
+import random
+random.seed(1)
+print("# sample_rate_hz: 1000\ntorque_Nm,velocity_rad_per_s")
+speed = 0.0
+for n in range(4000):
+    torque = random.gauss(0, 1)
+    print(f"{torque},{speed + random.gauss(0, .01)}")
+    speed = 0.9 * speed + 0.1 * torque
+' >random.csv
+for method in h1 lpm; do
+    "$SERVOSCOPE" frf random.csv --method "$method" --json --out frf.csv >said
+    python3 -c '
+import json
+said = json.load(open("said"))
+assert said["runs"][0]["periodic"] is False and said["runs"][0]["rows"] == 4000 and said["lines_valid"] > 100, said
+assert said["suited_method"] == "lpm" and said["warning"], said
+' || fail "random.csv by $method: $(cat said)"
+done
+"$SERVOSCOPE" frf random.csv --method h1 --segment 200 --out frf.csv >said
+grep -q 'no period; 4000 rows in one piece' said || fail "$(cat said)"
+grep -q 'warning: biased if a loop is closed' said || fail "$(cat said)"
+[ "$(grep -vc '^#' frf.csv)" -eq 100 ] || fail "--segment 200: $(grep -vc '^#' frf.csv) rows"
+
 # A recording of somebody else: no keys, other names; period and lines are found.
 grep -v '^#' run1.csv | sed '1s/torque_Nm/iq/; 1s/velocity_rad_per_s/omega/' >foreign.csv
 "$SERVOSCOPE" frf foreign.csv --map 'torque_Nm=iq,velocity_rad_per_s=omega*1' --out frf.csv >said
@@ -59,12 +108,16 @@ grep -q '5 of 7 periods of 500 samples count, 1 left out for settling, 1 for los
 rm -f x.csv
 refuse 2 '--out is missing' run1.csv
 refuse 2 'RUN.csv' --out x.csv
-for method in lpm parametric indirect h1 nonsense; do
-    refuse 2 "method '$method' is not in this build: expected one of mean, hann" run1.csv --method "$method" --out x.csv
-done
+refuse 2 "method 'nonsense' is not in this build: expected one of mean, hann, lpm, h1, indirect" run1.csv --method nonsense --out x.csv
+refuse 1 'does not repeat itself' random.csv --out x.csv
+refuse 2 'has no periods to leave out' random.csv --method lpm --settle 1 --out x.csv
+refuse 1 'say --reference COLUMN' random.csv --method indirect --out x.csv
+refuse 2 "--order: '11'" run1.csv --method lpm --order 11 --out x.csv
+refuse 2 "--order: 'some'" run1.csv --method lpm --order some --out x.csv
+refuse 1 'needs 5000 lines between the excited ones' run1.csv --method lpm --half-width 2500 --out x.csv
 refuse 2 "--settle: 'some', expected a whole number of periods or auto" run1.csv --settle some --out x.csv
 refuse 2 "--settle: '1.5'" run1.csv --settle 1.5 --out x.csv
-refuse 2 '--reference' run1.csv --reference position_ref_rad --out x.csv
+refuse 1 "no column 'force_ref_N' to take as the reference" run1.csv --reference force_ref_N --out x.csv
 refuse 1 "no column 'force_N'" run1.csv --input force_N --out x.csv
 refuse 1 'none.csv' none.csv --out x.csv
 refuse 1 '1 of 7 periods count (6 left out for settling' run1.csv --settle 6 --out x.csv

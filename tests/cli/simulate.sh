@@ -29,6 +29,21 @@ assert said["rows"] == 1500 and said["periods"] == 3 and said["settle_periods"] 
 assert said["ended"] == "complete" and said["samples_lost"] == 0, said
 ' || fail "--json: $(cat said)"
 
+# Without a fade in the first row is the table's start, with the axis at rest there.
+"$SERVOSCOPE" simulate "${all[@]}" --settle 0 --fade 0 --out start.csv --quiet
+python3 -c '
+import csv
+def read(name):
+    lines = open(name).read().splitlines()
+    keys = dict(line[2:].split(": ", 1) for line in lines if line.startswith("# "))
+    return keys, list(csv.DictReader(line for line in lines if not line.startswith("#")))
+keys, table = read("table.csv")
+start, row = table[int(keys["start_index"])], read("start.csv")[1][0]
+asked, stands = float(row["position_ref_rad"]), float(row["position_rad"])
+assert abs(asked - float(start["position_rad"])) < 1e-8, (asked, start)
+assert abs(asked) > 1e-3 and abs(stands - asked) < 1e-4, (asked, stands)
+' || fail "the first row without a fade in: $(grep -v '#' start.csv | head -2)"
+
 # A limit: status 1, but what was measured is kept and says why it ends.
 status=0
 "$SERVOSCOPE" simulate "${all[@]}" --limit-velocity 0.5 --out limited.csv >said 2>err || status=$?
@@ -57,6 +72,7 @@ grep -qx '# interrupted: true' cut.csv || fail "an interrupted run is not marked
 
 # Refusals
 refuse 2 '--model is missing' --table table.mst --periods 3 --out x.csv
+refuse 2 'expected 0 to 16777216' --model model.json --table table.mst --periods 3 --fade -1 --out x.csv
 refuse 2 '--periods' --model model.json --table table.mst --periods 0 --out x.csv
 refuse 2 "--mode: 'velocity', expected cascade or torque" "${all[@]}" --mode velocity --out x.csv
 refuse 1 'none.mst' --model model.json --table none.mst --periods 3 --out x.csv

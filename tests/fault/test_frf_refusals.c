@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+#include "lab/estimate/arbitrary.h"
 #include "lab/estimate/method.h"
 #include "lab/estimate/periodic.h"
 #include "lab/numeric/statistics.h"
@@ -115,10 +116,124 @@ static void test_periodic_refuses_lines_beyond_half_the_period(void)
 
 static void test_method_names_that_are_not_there_are_refused_with_a_list(void)
 {
-    TEST_ASSERT_NULL(estimate_method_find("lpm", &error));
+    TEST_ASSERT_NULL(estimate_method_find("nonsense", &error));
     TEST_ASSERT_EQUAL_INT(error_usage, error.status);
-    TEST_ASSERT_NOT_NULL(strstr(error.message, "'lpm' is not in this build: expected one of mean, hann"));
+    TEST_ASSERT_NOT_NULL_MESSAGE(
+        strstr(error.message, "'nonsense' is not in this build: expected one of mean, hann, lpm, h1, indirect"),
+        error.message);
     TEST_ASSERT_NOT_NULL(estimate_method_find("hann", &error));
+}
+
+static void expect_method_refusal(const char *name, const struct periodic_options *cut,
+                                  const struct estimate_options *tuning, const char *text)
+{
+    struct frf frf;
+    const struct estimate_method *method = estimate_method_find(name, &error);
+    TEST_ASSERT_NOT_NULL(method);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, periodic_cut(&run, cut, &recording, &error), error.message);
+    TEST_ASSERT_EQUAL_INT(error_refused, method->estimate(&recording, tuning, &frf, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, text), error.message);
+    periodic_free(&recording);
+}
+
+static void test_lpm_refuses_polynomials_that_its_lines_do_not_determine(void)
+{
+    const struct periodic_options cut = {.period_samples = length};
+    expect_method_refusal("lpm", &cut, &(struct estimate_options){.order = 4, .half_width = 2},
+                          "order 4 with 2 lines on each side");
+    expect_method_refusal("lpm", &cut, &(struct estimate_options){.order = 11}, "an order from 0 to 10");
+    /* 6 periods of 120 samples: 359 lines, 59 of them excited. */
+    expect_method_refusal("lpm", &cut, &(struct estimate_options){.order = 2, .half_width = 151},
+                          "needs 302 lines between the excited ones, 6 periods of 120 samples have 300");
+}
+
+static void test_lpm_refuses_periods_of_which_no_two_follow_each_other(void)
+{
+    double *valid = run_add_column(&run, "valid");
+    for (size_t n = 0; n < run.rows; n++) {
+        valid[n] = n / length % 2 == 0;
+    }
+    expect_method_refusal("lpm", &(struct periodic_options){.period_samples = length}, NULL,
+                          "the longest stretch without a gap has 1 periods");
+}
+
+static void test_methods_refuse_an_input_without_power(void)
+{
+    const uint32_t dead[] = {40, 41};
+    const struct periodic_options cut = {.period_samples = length, .bins = dead, .bin_count = 2};
+    struct random random;
+    random_seed(&random, 3);
+    TEST_ASSERT_NOT_NULL(run_add_column(&run, "velocity_ref_rad_per_s"));
+    for (size_t n = 0; n < run.rows; n++) {
+        run.columns[0].data[n] += 0.01 * random_normal(&random);
+        run.columns[2].data[n] = random_normal(&random);
+    }
+    const char *const names[] = {"mean", "hann", "lpm", "h1", "indirect"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        expect_method_refusal(names[i], &cut, NULL, "no power above its scatter on any of 2 lines");
+    }
+}
+
+static void test_indirect_refuses_a_reference_that_is_none(void)
+{
+    const struct periodic_options cut = {.period_samples = length};
+    expect_method_refusal("indirect", &cut, NULL, "say --reference COLUMN");
+    expect_method_refusal("indirect", &(struct periodic_options){.period_samples = length, .reference = "torque_Nm"},
+                          NULL, "reference and input are both torque_Nm");
+    expect_refusal(&(struct periodic_options){.reference = "position_ref_rad"}, "no column 'position_ref_rad'");
+    TEST_ASSERT_NOT_NULL(run_add_column(&run, "velocity_ref_rad_per_s"));
+    expect_method_refusal("indirect", &cut, NULL, "say --reference COLUMN");
+    expect_refusal(&(struct periodic_options){.reference = "velocity_ref_rad_per_s"},
+                   "velocity_ref_rad_per_s does not change");
+    run.columns[2].data[7] = NAN;
+    expect_refusal(&(struct periodic_options){.period_samples = length}, "row 8 of velocity_ref_rad_per_s");
+}
+
+static void expect_arbitrary_refusal(const char *name, const struct estimate_options *tuning, const char *text)
+{
+    struct arbitrary arbitrary;
+    struct frf frf;
+    const struct estimate_method *method = estimate_method_find(name, &error);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, arbitrary_cut(&run, &(struct arbitrary_options){0}, &arbitrary, &error),
+                                  error.message);
+    TEST_ASSERT_EQUAL_INT(error_refused, method->estimate_arbitrary(&arbitrary, tuning, &frf, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, text), error.message);
+}
+
+static void test_methods_without_periods_refuse_too_little(void)
+{
+    struct arbitrary arbitrary;
+    expect_arbitrary_refusal("h1", &(struct estimate_options){.segment_samples = 400}, "2 segments of 400 samples");
+    expect_arbitrary_refusal("h1", &(struct estimate_options){.segment_samples = 8}, "at least 16 samples");
+    expect_arbitrary_refusal("indirect", NULL, "say --reference COLUMN");
+    expect_arbitrary_refusal("lpm", &(struct estimate_options){.order = 2, .half_width = 2},
+                             "fewer unknowns (6) than lines (5)");
+    expect_arbitrary_refusal("lpm", &(struct estimate_options){.order = 2, .half_width = 200}, "needs 401 around");
+    double *valid = run_add_column(&run, "valid");
+    for (size_t n = 0; n < run.rows; n++) {
+        valid[n] = n % 50 != 20;
+    }
+    TEST_ASSERT_EQUAL_INT(error_refused, arbitrary_cut(&run, &(struct arbitrary_options){0}, &arbitrary, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "without lost samples has 49 rows"), error.message);
+    run.columns[1].data[3] = NAN;
+    TEST_ASSERT_EQUAL_INT(error_refused, arbitrary_cut(&run, &(struct arbitrary_options){0}, &arbitrary, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "row 4 of velocity_rad_per_s"), error.message);
+}
+
+/// A cut that fails for want of a period says so to those who can do without one.
+static void test_periodic_tells_when_only_the_period_is_missing(void)
+{
+    struct random random;
+    random_seed(&random, 2);
+    TEST_ASSERT_EQUAL_INT(error_refused,
+                          periodic_cut(&run, &(struct periodic_options){.input = "x"}, &recording, &error));
+    TEST_ASSERT_FALSE(recording.aperiodic);
+    for (size_t n = 0; n < run.rows; n++) {
+        run.columns[0].data[n] = random_normal(&random);
+    }
+    TEST_ASSERT_EQUAL_INT(error_refused, periodic_cut(&run, &(struct periodic_options){0}, &recording, &error));
+    TEST_ASSERT_TRUE(recording.aperiodic);
+    TEST_ASSERT_NOT_NULL(strstr(error.message, "--method lpm, h1 or indirect"));
 }
 
 static void test_average_refuses_other_lines_and_names(void)
@@ -128,7 +243,7 @@ static void test_average_refuses_other_lines_and_names(void)
     for (size_t r = 0; r < 2; r++) {
         struct periodic_options options = {.period_samples = length};
         TEST_ASSERT_EQUAL_INT(0, periodic_cut(&run, &options, &recording, &error));
-        TEST_ASSERT_EQUAL_INT(0, estimate_methods[0].estimate(&recording, &both[r], &error));
+        TEST_ASSERT_EQUAL_INT(0, estimate_methods[0].estimate(&recording, NULL, &both[r], &error));
         periodic_free(&recording);
     }
     TEST_ASSERT_EQUAL_INT(0, estimate_average(both, 2, &average, &error));
@@ -155,6 +270,12 @@ int main(void)
     RUN_TEST(test_periodic_refuses_fewer_than_two_periods);
     RUN_TEST(test_periodic_refuses_lines_beyond_half_the_period);
     RUN_TEST(test_method_names_that_are_not_there_are_refused_with_a_list);
+    RUN_TEST(test_lpm_refuses_polynomials_that_its_lines_do_not_determine);
+    RUN_TEST(test_lpm_refuses_periods_of_which_no_two_follow_each_other);
+    RUN_TEST(test_methods_refuse_an_input_without_power);
+    RUN_TEST(test_indirect_refuses_a_reference_that_is_none);
+    RUN_TEST(test_methods_without_periods_refuse_too_little);
+    RUN_TEST(test_periodic_tells_when_only_the_period_is_missing);
     RUN_TEST(test_average_refuses_other_lines_and_names);
     return UNITY_END();
 }

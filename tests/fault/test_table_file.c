@@ -234,7 +234,7 @@ static void test_table_file_messages_say_value_and_expectation(void)
     TEST_ASSERT_EQUAL_INT(0, table_file_write_mst(mst_path, &table, &error));
     signed_size = read_file(mst_path, signed_bytes);
     expect_message(0, 0x0A0D4E50u, "not a table");
-    expect_message(4, 0x01030002u, "found 2, expected 1");
+    expect_message(4, 0x01030003u, "found 3, expected 1 or 2");
     expect_message(4, 0x01090001u, "found 9, expected 1 to 3");
     expect_message(4, 0x07030001u, "found 7, expected 1 (i16)");
     expect_message(12, 0, "found 1000/0 Hz");
@@ -247,6 +247,38 @@ static void test_table_file_messages_say_value_and_expectation(void)
     expect_message(60, 1, "number 1 of the list is 1, expected 2 to 11");
     expect_message(64, 12, "number 2 of the list is 12, expected 6 to 11");
     expect_message(52, 0, "found 0x00000000, but the bytes give 0x");
+}
+
+static void test_table_file_travel_reads_back(void)
+{
+    static const double travels[] = {6.283185307179586, -1e-5, 20e-3};
+    for (int format = msgen_format_i16; format <= msgen_format_f32; format++) {
+        for (unsigned i = 0; i < sizeof travels / sizeof travels[0]; i++) {
+            struct table copy;
+            table.format = (enum msgen_format)format;
+            table.travel_per_period = travels[i];
+            memset(table.scale, 0, sizeof table.scale);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(0, table_file_write_mst(mst_path, &table, &error), error.message);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(0, table_file_read(mst_path, &copy, &error), error.message);
+            uint8_t bytes[room];
+            TEST_ASSERT_EQUAL_size_t(table_file_bytes(&copy), read_file(mst_path, bytes));
+            /* Half of a 2^30th of a count, and the last bits of the double. */
+            double within = (double)copy.scale[2] / 2147483648.0 + 4e-16 * fabs(travels[i]);
+            TEST_ASSERT_DOUBLE_WITHIN(within, travels[i], copy.travel_per_period);
+            if (format == msgen_format_i32) {
+                /* 1024 periods fit the player's 32 bits, and what is left is the resolution of the samples. */
+                double most = 2147483647.0 * (double)copy.scale[2];
+                TEST_ASSERT_TRUE(1024 * fabs(travels[i]) + peak_of(table.position) <= most);
+                expect_close(table.position, copy.position, 0.51 * (double)copy.scale[2]);
+            }
+            table_free(&copy);
+        }
+    }
+    table.travel_per_period = 0.5;
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, table_file_write_csv(csv_path, &table, &error), error.message);
+    uint8_t text[room];
+    text[read_file(csv_path, text)] = 0;
+    TEST_ASSERT_NOT_NULL(strstr((char *)text, "# start_index: 5\n# travel_per_period_rad: 0.5\n# table_crc32: 0x"));
 }
 
 static void expect_refused_write(const char *expected)
@@ -285,6 +317,16 @@ static void test_table_file_write_refuses_what_is_no_table(void)
     expect_refused_write("found 3, expected 4 to 1048576");
     table.channels = 4;
     expect_refused_write("found 4, expected 1 to 3");
+    table.travel_per_period = NAN;
+    expect_refused_write("travel of nan per period: a finite number was expected");
+    table.travel_per_period = 1e-3;
+    table.channels = 2;
+    expect_refused_write("travel of 0.001 per period");
+    table.travel_per_period = 1e6;
+    table.scale[2] = 1e-6f;
+    expect_refused_write("travel of 1e+06 per period: at most 2147.48 was expected");
+    table.travel_per_period = 1e-20;
+    expect_refused_write("travel of 1e-20 per period: 0, or at least ");
 }
 
 static void test_table_file_write_refuses_what_does_not_fit_its_format(void)
@@ -456,6 +498,7 @@ int main(void)
     RUN_TEST(test_table_file_every_truncation_is_refused);
     RUN_TEST(test_table_file_every_changed_byte_is_refused);
     RUN_TEST(test_table_file_messages_say_value_and_expectation);
+    RUN_TEST(test_table_file_travel_reads_back);
     RUN_TEST(test_table_file_write_refuses_what_is_no_table);
     RUN_TEST(test_table_file_write_refuses_what_does_not_fit_its_format);
     RUN_TEST(test_table_file_refused_write_keeps_the_old_file);

@@ -128,6 +128,27 @@ static void test_fft_of_a_cosine_is_two_lines_of_half_its_height(void)
     }
 }
 
+static void test_fft_of_a_pair_is_that_of_both_scaled_signals(void)
+{
+    for (size_t l = 0; l < length_count; l++) {
+        size_t n = lengths[l];
+        plan_for(n);
+        fill(n);
+        double *first = malloc(2 * n * sizeof *first), *second = first + n;
+        TEST_ASSERT_NOT_NULL(first);
+        for (size_t i = 0; i < n; i++) {
+            first[i] = in[2 * i];
+            second[i] = in[2 * i + 1];
+            in[2 * i] *= 2.0;
+            in[2 * i + 1] *= -0.5;
+        }
+        fft_forward(plan, in, out);
+        TEST_ASSERT_TRUE(fft_forward_pair(plan, first, 2.0, second, -0.5, back));
+        TEST_ASSERT_EQUAL_MEMORY(out, back, 2 * n * sizeof out[0]);
+        free(first);
+    }
+}
+
 static void test_fft_leaves_its_input(void)
 {
     plan_for(60);
@@ -139,6 +160,28 @@ static void test_fft_leaves_its_input(void)
     TEST_ASSERT_EQUAL_MEMORY(back, in, 120 * sizeof in[0]);
 }
 
+/// The sanitizers do not look into the transform's inner loops, so the borders of its output are guarded here.
+static void test_fft_writes_nothing_beside_its_output(void)
+{
+    enum { border = 64 };
+    static double guarded[2 * longest + 2 * border];
+    const double mark = -8.25e99;
+    for (size_t l = 0; l < length_count; l++) {
+        size_t n = lengths[l];
+        plan_for(n);
+        fill(n);
+        for (size_t i = 0; i < 2 * n + 2 * border; i++) {
+            guarded[i] = mark;
+        }
+        fft_forward(plan, in, guarded + border);
+        fft_inverse(plan, in, guarded + border);
+        for (size_t i = 0; i < border; i++) {
+            TEST_ASSERT_TRUE(guarded[i] <= mark && guarded[i] >= mark);
+            TEST_ASSERT_TRUE(guarded[border + 2 * n + i] <= mark && guarded[border + 2 * n + i] >= mark);
+        }
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -147,6 +190,8 @@ int main(void)
     RUN_TEST(test_fft_keeps_the_energy);
     RUN_TEST(test_fft_of_a_late_pulse_turns_by_its_delay);
     RUN_TEST(test_fft_of_a_cosine_is_two_lines_of_half_its_height);
+    RUN_TEST(test_fft_of_a_pair_is_that_of_both_scaled_signals);
     RUN_TEST(test_fft_leaves_its_input);
+    RUN_TEST(test_fft_writes_nothing_beside_its_output);
     return UNITY_END();
 }

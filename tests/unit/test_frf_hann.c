@@ -67,15 +67,16 @@ static void release(struct run *run)
     run_free(run);
 }
 
-static double error_of(const struct run *run, int (*estimate)(const struct periodic *, struct frf *, struct error *),
-                       double pole)
+typedef int estimator(const struct periodic *, const struct estimate_options *, struct frf *, struct error *);
+
+static double error_of(const struct run *run, estimator *estimate, double pole)
 {
     struct periodic recording;
     struct frf frf;
     struct error error;
     double sum = 0.0;
     TEST_ASSERT_EQUAL_INT(0, periodic_cut(run, &(struct periodic_options){0}, &recording, &error));
-    TEST_ASSERT_EQUAL_INT(0, estimate(&recording, &frf, &error));
+    TEST_ASSERT_EQUAL_INT(0, estimate(&recording, NULL, &frf, &error));
     for (size_t b = 0; b < lines; b++) {
         double complex deviation = frf.real[b] + frf.imag[b] * I - truth(pole, run->bins[b]);
         sum += creal(deviation * conj(deviation)) / lines;
@@ -129,7 +130,7 @@ static void test_frf_hann_std_and_noise_penalty_are_right(void)
         simulate(&run, 0.0, 0.1, &random);
         mean += pow(error_of(&run, frf_mean_estimate, 0.0), 2.0) / runs;
         TEST_ASSERT_EQUAL_INT(0, periodic_cut(&run, &(struct periodic_options){0}, &recording, &error));
-        TEST_ASSERT_EQUAL_INT(0, frf_hann_estimate(&recording, &frf, &error));
+        TEST_ASSERT_EQUAL_INT(0, frf_hann_estimate(&recording, NULL, &frf, &error));
         double factor = circle_confidence_factor(0.95, frf.degrees_of_freedom / 2.0);
         for (size_t b = 0; b < lines; b++) {
             double deviation = cabs(frf.real[b] + frf.imag[b] * I - truth(0.0, run.bins[b]));
@@ -167,7 +168,7 @@ static void test_frf_hann_refuses_fewer_than_four_periods_in_a_row(void)
         valid[n] = n != 3 * length + 5 && n != 6 * length + 5;
     }
     TEST_ASSERT_EQUAL_INT(0, periodic_cut(&run, &(struct periodic_options){0}, &recording, &error));
-    TEST_ASSERT_EQUAL_INT(error_refused, frf_hann_estimate(&recording, &frf, &error));
+    TEST_ASSERT_EQUAL_INT(error_refused, frf_hann_estimate(&recording, NULL, &frf, &error));
     TEST_ASSERT_NOT_NULL(strstr(error.message, "longest stretch without a gap has 3 periods"));
     periodic_free(&recording);
     release(&run);

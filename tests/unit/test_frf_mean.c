@@ -91,7 +91,7 @@ static struct tally monte_carlo(double complex input, double complex output, dou
         struct error error;
         /* 40 dB: the quotient's curvature stays below a tenth of a per cent of the variance. */
         fill(recording, input, output, 0.01, rho, &random);
-        TEST_ASSERT_EQUAL_INT(0, frf_mean_estimate(&recording->periodic, &frf, &error));
+        TEST_ASSERT_EQUAL_INT(0, frf_mean_estimate(&recording->periodic, NULL, &frf, &error));
         for (size_t line = 0; line < lines; line++) {
             double deviation = cabs(frf.real[line] + frf.imag[line] * I - output / input);
             TEST_ASSERT_TRUE(frf.valid[line]);
@@ -143,7 +143,7 @@ static void test_frf_mean_marks_line_without_power(void)
     }
     struct frf frf;
     struct error error;
-    TEST_ASSERT_EQUAL_INT(0, frf_mean_estimate(&recording->periodic, &frf, &error));
+    TEST_ASSERT_EQUAL_INT(0, frf_mean_estimate(&recording->periodic, NULL, &frf, &error));
     for (size_t line = 0; line < lines; line++) {
         TEST_ASSERT_EQUAL_INT(line != 7, frf.valid[line]);
     }
@@ -157,7 +157,7 @@ static void test_frf_mean_refuses_input_without_any_power(void)
     struct made_recording *recording = make_recording();
     struct frf frf;
     struct error error;
-    TEST_ASSERT_EQUAL_INT(error_refused, frf_mean_estimate(&recording->periodic, &frf, &error));
+    TEST_ASSERT_EQUAL_INT(error_refused, frf_mean_estimate(&recording->periodic, NULL, &frf, &error));
     TEST_ASSERT_NOT_NULL(strstr(error.message, "no power"));
     free(recording);
 }
@@ -236,7 +236,7 @@ static void test_frf_mean_std_is_right_in_closed_loop(void)
         simulate_loop(&run, reference, &random);
         TEST_ASSERT_EQUAL_INT(0, periodic_cut(&run, &(struct periodic_options){0}, &recording, &error));
         TEST_ASSERT_EQUAL_size_t(loop_settle, recording.settle);
-        TEST_ASSERT_EQUAL_INT(0, frf_mean_estimate(&recording, &frf, &error));
+        TEST_ASSERT_EQUAL_INT(0, frf_mean_estimate(&recording, NULL, &frf, &error));
         for (size_t b = 0; b < loop_lines; b++) {
             double deviation = cabs(frf.real[b] + frf.imag[b] * I - loop_truth(run.bins[b]));
             predicted[b] += frf.std[b] * frf.std[b];
@@ -285,7 +285,7 @@ static void test_frf_mean_leaves_out_periods_with_lost_samples(void)
     TEST_ASSERT_EQUAL_size_t(2, recording.lost);
     TEST_ASSERT_EQUAL_size_t(periods - 2, recording.used);
     TEST_ASSERT_EQUAL_size_t(5 * loop_length + 17 + 1, recording.first_lost_row);
-    TEST_ASSERT_EQUAL_INT(0, frf_mean_estimate(&recording, &frf, &error));
+    TEST_ASSERT_EQUAL_INT(0, frf_mean_estimate(&recording, NULL, &frf, &error));
     for (size_t b = 0; b < loop_lines; b++) {
         /* Ten standard deviations: one nonsense sample in a period that counts would be off by thousands. */
         TEST_ASSERT_TRUE(cabs(frf.real[b] + frf.imag[b] * I - loop_truth(run.bins[b])) < 10.0 * frf.std[b]);
@@ -311,7 +311,7 @@ static void test_frf_mean_takes_drift_out_of_a_position(void)
     struct error error;
     TEST_ASSERT_EQUAL_INT(0, periodic_cut(&run, &(struct periodic_options){0}, &recording, &error));
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.37, recording.trend_per_sample);
-    TEST_ASSERT_EQUAL_INT(0, frf_mean_estimate(&recording, &frf, &error));
+    TEST_ASSERT_EQUAL_INT(0, frf_mean_estimate(&recording, NULL, &frf, &error));
     for (size_t b = 0; b < loop_lines; b++) {
         /* Rounding of a ramp of 800 against a response of 200. */
         TEST_ASSERT_DOUBLE_WITHIN(1e-10, 2.0, frf.real[b]);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/spectra.h"
+#include "lab/estimate/stretch.h"
 #include "lab/numeric/statistics.h"
 
 #include "unity.h"
@@ -85,10 +86,85 @@ static void test_spectra_all_bins_equal_chosen_ones(void)
     free(signal);
 }
 
+/// Rounding of the larger of two signals in one transform must not reach the smaller one.
+static void test_spectra_of_both_keep_a_small_signal_beside_a_large_one(void)
+{
+    enum { length = 240, bin_count = 60, periods = 2 };
+    double *large = random_signal(periods * length, 5);
+    double *small = random_signal(periods * length, 6);
+    uint32_t bins[bin_count];
+    double complex spectra[2][periods * bin_count];
+    for (uint32_t b = 0; b < bin_count; b++) {
+        bins[b] = 2 * b;
+    }
+    for (size_t n = 0; n < periods * length; n++) {
+        large[n] *= 3e9;
+        small[n] *= 2e-9;
+    }
+    TEST_ASSERT_TRUE(spectra_prefers_fft(length, bin_count));
+    TEST_ASSERT_TRUE(spectra_transform_both(large, small, length, periods, bins, bin_count, spectra[0], spectra[1]));
+    for (size_t i = 0; i < periods * bin_count; i++) {
+        size_t start = i / bin_count * length;
+        double complex of_large = by_definition(large + start, length, bins[i % bin_count]);
+        double complex of_small = by_definition(small + start, length, bins[i % bin_count]);
+        TEST_ASSERT_TRUE(cabs(spectra[0][i] - of_large) < 3e9 * rounding);
+        TEST_ASSERT_TRUE(cabs(spectra[1][i] - of_small) < 2e-9 * rounding);
+    }
+    free(large);
+    free(small);
+}
+
+/// Near multiples of P, and everywhere if P is small, the short way equals the long one.
+static void check_near(size_t length, size_t periods, size_t reach)
+{
+    size_t rows = length * periods;
+    size_t lines = rows / 2 + 1;
+    double *input = random_signal(rows, rows);
+    double *output = random_signal(rows, rows + 1);
+    char input_name[] = "u";
+    char output_name[] = "y";
+    struct run_column columns[] = {{input_name, input}, {output_name, output}};
+    uint32_t bins[] = {1, (uint32_t)(length - 1) / 2};
+    const struct run run = {.rows = rows, .columns = columns, .column_count = 2};
+    const struct periodic recording = {.run = &run,
+                                       .input = "u",
+                                       .output = "y",
+                                       .period_samples = length,
+                                       .bins = bins,
+                                       .bin_count = 2,
+                                       .trend_per_sample = 0.01};
+    const struct stretch stretch = {.periods = periods, .rows = rows};
+    double complex *whole = malloc(4 * lines * sizeof *whole);
+    double complex *near = whole + 2 * lines;
+    TEST_ASSERT_TRUE(stretch_transform(&recording, &stretch, whole, whole + lines));
+    TEST_ASSERT_TRUE(stretch_transform_near(&recording, &stretch, reach, near, near + lines));
+    for (size_t line = 0; line < lines; line++) {
+        size_t beyond = line % periods;
+        beyond = beyond < periods - beyond ? beyond : periods - beyond;
+        if (beyond <= reach) {
+            TEST_ASSERT_TRUE(cabs(near[line] - whole[line]) < rounding * (double)rows);
+            TEST_ASSERT_TRUE(cabs(near[lines + line] - whole[lines + line]) < rounding * (double)rows);
+        }
+    }
+    free(whole);
+    free(input);
+    free(output);
+}
+
+static void test_stretch_near_equals_the_whole_transform(void)
+{
+    check_near(60, 2, 6);
+    check_near(61, 3, 6);
+    check_near(540, 8, 6);
+    check_near(61, 50, 7);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_spectra_equal_definition_by_sums_and_by_fft);
     RUN_TEST(test_spectra_all_bins_equal_chosen_ones);
+    RUN_TEST(test_spectra_of_both_keep_a_small_signal_beside_a_large_one);
+    RUN_TEST(test_stretch_near_equals_the_whole_transform);
     return UNITY_END();
 }

@@ -1,105 +1,72 @@
 /* SPDX-License-Identifier: MIT */
 /// servoscope design: from the limits of an axis to the table that a drive plays.
-#include "tools/servoscope/command.h"
-#include "tools/servoscope/design_options.h"
-#include "tools/servoscope/designing.h"
-#include "tools/servoscope/outputs.h"
-
+#include "lab/design/amplitude.h"
 #include "lab/design/design.h"
 #include "lab/design/lines.h"
+#include "lab/design/offset.h"
+#include "lab/design/predict.h"
 #include "lab/record/json_out.h"
+#include "lab/record/model_file.h"
+#include "tools/servoscope/command.h"
+#include "tools/servoscope/design_options.h"
+#include "tools/servoscope/design_summary.h"
+#include "tools/servoscope/designing.h"
+#include "tools/servoscope/interrupt.h"
+#include "tools/servoscope/outputs.h"
+#include "tools/servoscope/sequences.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static cJSON *json_of_peaks(const struct design_peaks *peaks, bool linear)
+/// Everything that one call works with.
+struct work {
+    const struct design_options *options;
+    struct design_request request;
+    struct design_limits limits; ///< as given; the request's are what an offset leaves of them
+    struct design_offset offset;
+    struct sim_model start_model;
+    struct sim_model predict_model;
+    const struct command_context *context;
+    struct terminal_line line;
+};
+
+static void show_progress(void *context, double share_done, double effective)
 {
-    cJSON *object = cJSON_CreateObject();
-    cJSON_AddNumberToObject(object, linear ? "position_m" : "position_rad", peaks->position_rad);
-    cJSON_AddNumberToObject(object, linear ? "velocity_m_per_s" : "velocity_rad_per_s", peaks->velocity_rad_per_s);
-    cJSON_AddNumberToObject(object, linear ? "acceleration_m_per_s2" : "acceleration_rad_per_s2",
-                            peaks->acceleration_rad_per_s2);
-    cJSON_AddNumberToObject(object, linear ? "force_N" : "torque_Nm", peaks->torque_Nm);
-    return object;
+    struct work *self = context;
+    if (!terminal_line_due(&self->line)) {
+        return;
+    }
+    double elapsed_s = terminal_line_elapsed_s(&self->line);
+    fprintf(stderr, "\r\033[K%5.1f %%  %.4f %s  %.0f s left", 100 * share_done, effective,
+            self->request.linear ? "N" : "Nm", share_done > 0 ? elapsed_s * (1 - share_done) / share_done : NAN);
 }
 
-static double period_seconds(const struct design_request *request)
+/// A model has to be of the kind of axis that is designed for.
+static int read_model(const char *option, const char *path, const struct design_request *request,
+                      struct sim_model *out_model, struct error *out_error)
 {
-    return (double)request->period_samples * request->rate_denominator / request->rate_numerator_hz;
-}
-
-static int print_json(const struct design_request *request, const struct design_result *result, struct error *out_error)
-{
-    const bool linear = request->linear;
-    cJSON *object = cJSON_CreateObject();
-    cJSON_AddStringToObject(object, "method", result->method);
-    cJSON_AddNumberToObject(object, "lines", (double)result->bin_count);
-    cJSON_AddNumberToObject(object, linear ? "effective_force_N" : "effective_torque_Nm", result->effective_torque_Nm);
-    cJSON_AddNumberToObject(object, linear ? "effective_force_continuous_N" : "effective_torque_continuous_Nm",
-                            result->effective_torque_continuous_Nm);
-    cJSON_AddNumberToObject(object, "crest_factor", result->crest_factor);
-    cJSON_AddItemToObject(object, "peak", json_of_peaks(&result->peak, linear));
-    cJSON_AddItemToObject(object, "peak_continuous", json_of_peaks(&result->peak_continuous, linear));
-    cJSON_AddNumberToObject(object, linear ? "bound_N" : "bound_Nm", result->bound_Nm);
-    cJSON_AddNumberToObject(object, "start_index", (double)result->start_index);
-    cJSON_AddNumberToObject(object, "cpu_s", result->cpu_s);
-    cJSON_AddNumberToObject(object, "test_time_s", period_seconds(request));
-    // Needs a plant and a noise level, which design is not given: not known is null, not zero.
-    cJSON_AddNullToObject(object, "predicted_std");
-    int status = json_print_stdout(object, out_error);
-    cJSON_Delete(object);
+    int status = model_file_read(path, out_model, out_error);
+    if (!status && out_model->linear != request->linear) {
+        status = error_set(out_error, error_refused, "--%s: %s is of a %s axis, the limits are of a %s one", option,
+                           path, out_model->linear ? "linear" : "rotary", request->linear ? "linear" : "rotary");
+    }
     return status;
 }
 
-static void print_peak(const char *name, const char *unit, double at_samples, double between, double limit)
+static int read_models(struct work *self, struct error *out_error)
 {
-    printf("  %-13s %11.5g %11.5g %-7s", name, at_samples, between, unit);
-    if (limit > 0) {
-        printf(" limit %.5g", limit);
+    const struct design_options *options = self->options;
+    int status = 0;
+    if (self->request.start == design_start_model) {
+        status = read_model("start", options->start + strlen("model:"), &self->request, &self->start_model, out_error);
+        self->request.start_model = &self->start_model;
     }
-    putchar('\n');
-}
-
-static void print_summary(const struct design_options *options, const struct design_request *request,
-                          const struct design_result *result)
-{
-    const bool linear = request->linear;
-    const char *unit = linear ? "N" : "Nm";
-    const struct design_limits *limits = &request->limits;
-    const struct design_peaks *peak = &result->peak;
-    const struct design_peaks *fine = &result->peak_continuous;
-    const double line_hz = 1 / period_seconds(request);
-    printf("%s: %zu lines, %.6g to %.6g Hz, period %zu samples (%.6g s), start at sample %zu\n", result->method,
-           result->bin_count, result->bins[0] * line_hz, result->bins[result->bin_count - 1] * line_hz,
-           result->period_samples, period_seconds(request), result->start_index);
-    printf("effective %s %.4f %s, crest factor %.3f; no phases give more than %.4f %s (reached: %.0f %%)\n",
-           linear ? "force" : "torque", result->effective_torque_Nm, unit, result->crest_factor, result->bound_Nm, unit,
-           100 * result->effective_torque_Nm / result->bound_Nm);
-    if (result->effective_torque_continuous_Nm < result->effective_torque_Nm) {
-        printf("between the samples a limit is exceeded; held there too, the effective value would be %.4f %s\n",
-               result->effective_torque_continuous_Nm, unit);
+    if (!status && options->predict) {
+        status = read_model("predict", options->predict, &self->request, &self->predict_model, out_error);
     }
-    printf("  peaks          at samples    in between\n");
-    print_peak("position", linear ? "m" : "rad", peak->position_rad, fine->position_rad, limits->position_rad);
-    print_peak("velocity", linear ? "m/s" : "rad/s", peak->velocity_rad_per_s, fine->velocity_rad_per_s,
-               limits->velocity_rad_per_s);
-    print_peak("acceleration", linear ? "m/s2" : "rad/s2", peak->acceleration_rad_per_s2, fine->acceleration_rad_per_s2,
-               limits->acceleration_rad_per_s2);
-    print_peak(linear ? "force" : "torque", unit, peak->torque_Nm, fine->torque_Nm, limits->torque_Nm);
-    printf("written: %s.mst, %s.csv, %s.h\n", options->out, options->out, options->out);
-}
-
-static int report(const struct design_options *options, const struct design_request *request,
-                  const struct design_result *result, const struct command_context *context, struct error *out_error)
-{
-    if (context->json) {
-        return print_json(request, result, out_error);
-    }
-    if (!context->quiet) {
-        print_summary(options, request, result);
-    }
-    return 0;
+    return status;
 }
 
 /// The three files of the prefix and the page, against the list of lines and against each other.
@@ -129,85 +96,283 @@ static int check_outputs(const struct design_options *options, struct error *out
     return status;
 }
 
-static int design_and_write(const struct design_options *options, struct design_request *request,
-                            const struct command_context *context, struct error *out_error)
+static double table_period_s(const struct work *self, size_t period_samples)
 {
-    struct design_lines lines;
+    return (double)period_samples * self->request.rate_denominator / self->request.rate_numerator_hz;
+}
+
+static double settle_time_s(const struct work *self, size_t period_samples)
+{
+    return isnan(self->options->settle_time_s) ? table_period_s(self, period_samples) : self->options->settle_time_s;
+}
+
+/// The periods of the table that will be played: settling ones are whole.
+static size_t played_periods(const struct work *self, size_t period_samples)
+{
+    double settle_periods = ceil(settle_time_s(self, period_samples) / table_period_s(self, period_samples) - 1e-9);
+    return (size_t)self->options->periods + (size_t)settle_periods;
+}
+
+static int check_minimum(void *context, const struct design_request *request, const struct design_result *result,
+                         struct error *out_error)
+{
+    const struct work *self = context;
+    const double least = self->options->minimum_effective;
+    if (least > 0 && result->effective_torque_Nm < least) {
+        const char *unit = request->linear ? "N" : "Nm";
+        return error_set(out_error, error_refused,
+                         "--minimum-effective: the limits allow %.6g %s with %s, expected at least %.6g %s: relax a "
+                         "limit or excite fewer lines; nothing was written",
+                         result->effective_torque_Nm, unit, result->method, least, unit);
+    }
+    return 0;
+}
+
+static int predict(const struct work *self, const struct design_result *result, double **out_std,
+                   struct error *out_error)
+{
+    if (!self->options->predict) {
+        return 0;
+    }
+    const struct design_predict_plan plan = {
+        .periods = (size_t)self->options->periods,
+        .torque_mode = self->request.torque_mode,
+    };
+    *out_std = calloc(result->bin_count, sizeof **out_std);
+    if (!*out_std) {
+        return error_set(out_error, error_refused, "memory is short for the prediction");
+    }
+    return design_predict_std(&self->predict_model, &self->request, result, &plan, *out_std, out_error);
+}
+
+/// An unfinished search is told like an unfinished diagnosis: what there is was written, and the exit status is 1.
+static int interrupted(struct error *out_error)
+{
+    return error_set(out_error, error_refused, "interrupted: the best so far was written, the search was not finished");
+}
+
+static int deliver(const struct work *self, const struct design_request *played, const struct design_result *result,
+                   const double *predicted_std, struct error *out_error)
+{
+    const struct design_options *options = self->options;
+    const struct design_summary summary = {
+        .prefix = options->out,
+        .request = played,
+        .result = result,
+        .test_time_s = (double)options->periods * table_period_s(self, result->period_samples) +
+                       settle_time_s(self, result->period_samples),
+        .predicted_std = predicted_std,
+    };
+    int status = designing_write(options->out, played, result, out_error);
+    if (!status && options->report) {
+        status = designing_report(options->report, played, result, out_error);
+    }
+    if (!status && self->context->json) {
+        cJSON *object = design_summary_json(&summary);
+        status = json_print_stdout(object, out_error);
+        cJSON_Delete(object);
+    } else if (!status && !self->context->quiet) {
+        design_summary_print(&summary);
+    }
+    return !status && result->interrupted ? interrupted(out_error) : status;
+}
+
+/// From the request, its lines and amplitudes set, to the files.
+static int design_one(struct work *self, struct error *out_error)
+{
     struct design_result result;
+    double *predicted_std = NULL;
+    int status = design_offset_reduce(&self->offset, &self->request, &self->request.limits, out_error);
+    status = status ? status : design_run(&self->request, &result, out_error);
+    terminal_line_clear(&self->line);
+    if (status) {
+        return status;
+    }
+    struct design_request played = self->request;
+    played.limits = self->limits;
+    status = check_minimum(self, &played, &result, out_error);
+    status = status ? status : design_offset_add(&self->offset, &played, &result, out_error);
+    status = status ? status : predict(self, &result, &predicted_std, out_error);
+    status = status ? status : deliver(self, &played, &result, predicted_std, out_error);
+    free(predicted_std);
+    design_result_free(&result);
+    return status;
+}
+
+static int design_multisine(struct work *self, struct error *out_error)
+{
+    struct design_request *request = &self->request;
+    struct design_lines lines;
+    double *shape = NULL;
     const struct design_line_grid grid = {
         .rate_hz = (double)request->rate_numerator_hz / request->rate_denominator,
         .period_samples = request->period_samples,
     };
-    int status = design_lines_parse(options->lines, &grid, request->seed, &lines, out_error);
+    int status = check_outputs(self->options, out_error);
+    status = status ? status : design_lines_parse(self->options->lines, &grid, request->seed, &lines, out_error);
     if (status) {
         return status;
     }
     request->bins = lines.bins;
     request->bin_count = lines.count;
-    status = design_run(request, &result, out_error);
-    if (!status) {
-        status = designing_write(options->out, request, &result, out_error);
-        if (!status && options->report) {
-            status = designing_report(options->report, request, &result, out_error);
-        }
-        status = status ? status : report(options, request, &result, context, out_error);
-        design_result_free(&result);
-    }
+    status = design_amplitude_shape(self->options->amplitude, request, &shape, out_error);
+    request->torque_shape = shape;
+    status = status ? status : design_one(self, out_error);
+    free(shape);
     design_lines_free(&lines);
+    return status;
+}
+
+static cJSON *describe(void *context, const char *prefix, const struct design_request *request,
+                       const struct design_result *result, double test_time_s)
+{
+    (void)context;
+    const struct design_summary summary = {
+        .prefix = prefix,
+        .request = request,
+        .result = result,
+        .test_time_s = test_time_s,
+    };
+    return design_summary_json(&summary);
+}
+
+/// What makes sense for one table only.
+static int check_sequence_options(const struct design_options *options, struct error *out_error)
+{
+    const char *refused = options->predict                       ? "predict"
+                          : options->stroke || options->stroke_m ? "stroke"
+                          : fabs(options->bias_velocity_rad_per_s) > 0 || fabs(options->bias_velocity_m_per_s) > 0
+                              ? "bias-velocity"
+                              : NULL;
+    return refused ? error_set(out_error, error_usage, "--%s is for a single table, not for a sequence of them (%s)",
+                               refused, options->lines)
+                   : 0;
+}
+
+static int design_sequence(struct work *self, struct error *out_error)
+{
+    const struct design_options *options = self->options;
+    const struct sequences_request request = {
+        .specification = options->lines,
+        .inputs = (size_t)options->inputs,
+        .periods = (uint64_t)options->periods,
+        .settle_time_s = options->settle_time_s,
+        .amplitude = options->amplitude,
+        .prefix = options->out,
+        .report = options->report,
+        .design = &self->request,
+        .judge = check_minimum,
+        .describe = describe,
+        .context = self,
+    };
+    struct sequences_summary summary = {0};
+    int status = check_sequence_options(options, out_error);
+    status = status ? status : sequences_design_and_write(&request, &summary, out_error);
+    terminal_line_clear(&self->line);
+    if (!status && self->context->json) {
+        cJSON *object = sequences_json(&summary);
+        status = json_print_stdout(object, out_error);
+        cJSON_Delete(object);
+    } else if (!status && !self->context->quiet) {
+        sequences_print(&request, &summary);
+    }
+    status = !status && summary.interrupted ? interrupted(out_error) : status;
+    sequences_summary_free(&summary);
     return status;
 }
 
 static int run(int argc, char **argv, const struct command_context *context, struct error *out_error)
 {
     struct design_options options;
-    struct design_request request;
+    struct work work = {.options = &options, .context = context};
     int status = design_options_read(argc, argv, &options, out_error);
-    status = status ? status : design_options_resolve(&options, &request, out_error);
-    status = status ? status : check_outputs(&options, out_error);
-    return status ? status : design_and_write(&options, &request, context, out_error);
+    status = status ? status : design_options_resolve(&options, &work.request, out_error);
+    status = status ? status : design_options_offset(&options, &work.request, &work.offset, out_error);
+    status = status ? status : read_models(&work, out_error);
+    if (status) {
+        return status;
+    }
+    struct interrupt signals;
+    work.limits = work.request.limits;
+    const size_t stroke_periods = work.offset.stroke_periods > 0 ? work.offset.stroke_periods : 1;
+    work.offset.played_periods = played_periods(&work, stroke_periods * work.request.period_samples);
+    work.request.stop_requested = interrupt_flag();
+    work.request.progress = show_progress;
+    work.request.progress_context = &work;
+    terminal_line_start(&work.line, context);
+    interrupt_catch(&signals, true);
+    const bool sequence = options.inputs > 1 || sequence_specification(options.lines);
+    status = sequence ? design_sequence(&work, out_error) : design_multisine(&work, out_error);
+    interrupt_release(&signals);
+    return status;
 }
 
 const struct command command_cmd_design = {
     .name = "design",
     .summary = "multisine table within the limits of an axis, as strong as they allow",
-    .help =
-        "servoscope design: a multisine table within the limits of an axis, as strong as they allow\n"
-        "\n"
-        "usage: servoscope design --rate HZ --period SAMPLES --lines SPEC [limits] [options] --out PREFIX\n"
-        "\n"
-        "Writes PREFIX.mst (the table), PREFIX.csv (one period of torque, position, velocity, acceleration) and\n"
-        "PREFIX.h (the table as C source).\n"
-        "\n"
-        "  --rate HZ            sample rate, also as a fraction: 8000/3\n"
-        "  --period SAMPLES     samples in one period, 4 to 1048576; the lines lie on multiples of rate / period\n"
-        "  --lines SPEC         linear:FMIN:FMAX:STEP      every STEP Hz\n"
-        "                       odd:FMIN:FMAX:STEP         odd multiples of STEP\n"
-        "                       random-odd:FMIN:FMAX:STEP  the same, one of four neighbours left out by --seed\n"
-        "                       quasilog:FMIN:FMAX:RATIO   each line RATIO times the one before, on the grid\n"
-        "                       list:FILE                  one frequency in Hz per line\n"
-        "\n"
-        "Limits; what is not given does not limit, one at least is needed, and the inertia (or mass) always is:\n"
-        "  --limit-position RAD --limit-velocity RAD_PER_S --limit-acceleration RAD_PER_S2 --limit-torque NM\n"
-        "  --inertia KGM2       everything that moves, seen from the motor\n"
-        "  --limit-position-m M --limit-velocity-m-per-s V --limit-acceleration-m-per-s2 A --limit-force-n N\n"
-        "  --mass KG            the same for a linear axis\n"
-        "  --pulley-radius M    converts the linear ones to the motor's side; both kinds may then be given\n"
-        "\n"
-        "  --method METHOD      fast (default): projections, then p-norm descent\n"
-        "                       mca: modified clipping; clip: standard clipping (--keep all or acceleration)\n"
-        "                       newman, schroeder, random: phases by formula or by --seed, not optimised\n"
-        "  --iterations I       of fast (projections), mca, clip; 400 if not given\n"
-        "  --starts S           of fast: the first is always the same, further ones are drawn by --seed (default 1)\n"
-        "  --grid continuous    limits hold at every instant, guaranteed (default)\n"
-        "  --grid samples       limits hold at the samples of the table only\n"
-        "  --start paper        begin at the zero crossing of velocity with the least acceleration (default)\n"
-        "  --start none         begin at sample 0\n"
-        "  --seed S             default 1\n"
-        "  --report FILE.html   a page: the period against its limits, the spectrum, the figures\n"
-        "\n"
-        "example, the belt drive of the first paper:\n"
-        "  servoscope design --rate 1000 --period 2000 --lines linear:0.5:100:0.5 --limit-torque 1 --inertia 0.00516 "
-        "\\\n"
-        "      --limit-velocity-m-per-s 0.05 --pulley-radius 0.0159 --out belt\n",
+    .help = "servoscope design: a multisine table within the limits of an axis, as strong as they allow\n"
+            "\n"
+            "usage: servoscope design --rate HZ --period SAMPLES --lines SPEC [limits] [options] --out PREFIX\n"
+            "\n"
+            "Writes PREFIX.mst (the table), PREFIX.csv (one period) and PREFIX.h (the table as C source); a sequence\n"
+            "PREFIX-1, PREFIX-2, ... and PREFIX.json, which measure and simulate take as --table.\n"
+            "\n"
+            "  --rate HZ            also as a fraction: 8000/3\n"
+            "  --period SAMPLES     4 to 1048576; lines lie on multiples of rate / period\n"
+            "  --lines SPEC         linear:FMIN:FMAX:STEP      every STEP Hz\n"
+            "                       odd:FMIN:FMAX:STEP         odd multiples of STEP\n"
+            "                       random-odd:FMIN:FMAX:STEP  the same, one of four left out by --seed\n"
+            "                       quasilog:FMIN:FMAX:RATIO   each line RATIO times the one before\n"
+            "                       list:FILE                  one frequency in Hz per line\n"
+            "                       octaves:FMIN:FMAX:STEP     a sequence of multisines, one per octave\n"
+            "                       dwell:FMIN:FMAX:STEP       a sequence of sines\n"
+            "  --inputs P           inputs at once, each on its own lines (default 1)\n"
+            "\n"
+            "Limits; what is not given does not limit, one at least is needed, and the inertia (or mass) always is:\n"
+            "  --limit-position RAD --limit-velocity RAD_PER_S --limit-acceleration RAD_PER_S2 --limit-torque NM\n"
+            "  --inertia KGM2       everything that moves, seen from the motor\n"
+            "  --limit-position-m M --limit-velocity-m-per-s V --limit-acceleration-m-per-s2 A --limit-force-n N\n"
+            "  --mass KG            the same for a linear axis\n"
+            "  --pulley-radius M    converts the linear ones to the motor's side; both kinds may then be given\n"
+            "  --minimum-effective T  refuse less than this (Nm, N)\n"
+            "\n"
+            "Amplitudes of the lines, relative to each other:\n"
+            "  --amplitude constraint  each line alone just reaches a limit (default)\n"
+            "              flat        equal torque; one-over-f: torque power falls with frequency\n"
+            "              d-optimal:MODEL.json,ALPHA  for the model's parameters, the share ALPHA spread evenly\n"
+            "              FILE        rows frequency_hz,amplitude\n"
+            "  --amplitude-tolerance DB  of fast: each line may be stronger or weaker by this much\n"
+            "\n"
+            "Phases:\n"
+            "  --method METHOD      fast (default): projections, then p-norm descent\n"
+            "                       linf: p-norms to 512 by least squares, slow; mca: modified clipping\n"
+            "                       clip: standard clipping (--keep all or acceleration)\n"
+            "                       newman, schroeder (default of sequences), random: not optimised\n"
+            "  --iterations I       of fast (projections), mca, clip\n"
+            "  --starts S           of fast: the first is always the same, further ones are drawn by --seed\n"
+            "  --time-budget S      of fast: starts for so many seconds\n"
+            "  --threads T          default: all processors; the result does not depend on it\n"
+            "  --grid continuous    limits hold at every instant, guaranteed (default)\n"
+            "  --grid samples       limits hold at the samples of the table only\n"
+            "  --seed S             default 1\n"
+            "\n"
+            "Start, and what is played under the multisine:\n"
+            "  --start paper        at the zero crossing of velocity with the least acceleration (default)\n"
+            "          bank         least transient of a bank of nominal drives; model:FILE: of that drive\n"
+            "          none         at sample 0\n"
+            "  --mode cascade       references for position, velocity and torque (default), or torque alone\n"
+            "  --stroke RAD:P       a slow sinusoidal travel of P periods of the multisine (--stroke-m M:P)\n"
+            "  --bias-velocity V    a constant speed in rad/s against stiction (--bias-velocity-m-per-s V)\n"
+            "\n"
+            "What to expect of a measurement:\n"
+            "  --periods P          counted periods (default 10; of a sequence: averaging factor)\n"
+            "  --settle-time S      for settling (default one period)\n"
+            "  --predict MODEL.json expected standard deviation of the response, with the model's noise\n"
+            "\n"
+            "  --report FILE.html   a page: the period against its limits, the spectrum, the figures\n"
+            "\n"
+            "example, the belt drive of the first paper:\n"
+            "  servoscope design --rate 1000 --period 2000 --lines linear:0.5:100:0.5 --limit-torque 1 \\\n"
+            "      --inertia 0.00516 --limit-velocity-m-per-s 0.05 --pulley-radius 0.0159 --out belt\n",
     .run = run,
 };

@@ -1,16 +1,20 @@
 /* SPDX-License-Identifier: MIT */
 /// servoscope frf: from a recording to a frequency response with its standard deviation.
 #include "lab/design/lines.h"
+#include "lab/estimate/advise.h"
+#include "lab/estimate/arbitrary.h"
 #include "lab/estimate/method.h"
 #include "lab/estimate/periodic.h"
-#include "lab/estimate/report.h"
-#include "lab/numeric/statistics.h"
-#include "lab/page/page.h"
-#include "lab/record/atomic_file.h"
+#include "lab/estimate/setup.h"
 #include "lab/record/frf_file.h"
 #include "lab/record/json_out.h"
+#include "lab/record/manifest.h"
 #include "lab/record/run.h"
 #include "tools/servoscope/command.h"
+#include "tools/servoscope/estimating_matrix.h"
+#include "tools/servoscope/estimating_outcome.h"
+#include "tools/servoscope/estimating_pieces.h"
+#include "tools/servoscope/estimating_sequence.h"
 #include "tools/servoscope/options.h"
 #include "tools/servoscope/outputs.h"
 
@@ -30,23 +34,28 @@ struct arguments {
     const char *map;
     const char *out;
     const char *report;
+    const char *order;
+    const char *domain;
+    const char *model_out;
+    const char *design;
+    const char *hold;
+    bool delay_free;
+    double delay_s;
     double rate_hz;
     long long period_samples;
+    long long half_width;
+    long long segment_samples;
 };
 
-/// What one run gave, kept for the summary.
-struct summary {
-    size_t period_samples;
-    size_t total;
-    size_t settle;
-    size_t lost;
-    size_t first_lost_row;
-    size_t used;
-    bool period_found;
-    bool bins_found;
-    struct settle transient;
-    double first_level;
-    double last_level;
+/// What is asked of every run.
+struct request {
+    const struct estimate_method *method;
+    struct periodic_options cut;
+    struct estimate_options tuning;
+    enum setup_hold hold;
+    struct estimating_matrix *matrix;
+    const struct command_context *context;
+    const struct run_sequence_segment *segment; ///< of a sequence that the run is part of; NULL: it is a run by itself
 };
 
 static int read_options(int argc, char **argv, struct arguments *out, struct error *out_error)
@@ -61,6 +70,15 @@ static int read_options(int argc, char **argv, struct arguments *out, struct err
         {.name = "map", .kind = option_text, .target = &out->map},
         {.name = "rate", .kind = option_positive, .target = &out->rate_hz},
         {.name = "period", .kind = option_integer, .target = &out->period_samples, .lowest = 3, .highest = 1e9},
+        {.name = "order", .kind = option_text, .target = &out->order},
+        {.name = "half-width", .kind = option_integer, .target = &out->half_width, .lowest = 1, .highest = 1e6},
+        {.name = "segment", .kind = option_integer, .target = &out->segment_samples, .lowest = 16, .highest = 1e9},
+        {.name = "domain", .kind = option_text, .target = &out->domain},
+        {.name = "delay-free", .kind = option_flag, .target = &out->delay_free},
+        {.name = "model-out", .kind = option_text, .target = &out->model_out},
+        {.name = "design", .kind = option_text, .target = &out->design},
+        {.name = "hold", .kind = option_text, .target = &out->hold},
+        {.name = "delay", .kind = option_number, .target = &out->delay_s, .highest = 1e6},
         {.name = "out", .kind = option_text, .target = &out->out, .required = true},
         {.name = "report", .kind = option_text, .target = &out->report},
     };
@@ -88,23 +106,62 @@ static int read_settle(const struct arguments *arguments, struct periodic_option
     return 0;
 }
 
-static int read_request(const struct arguments *arguments, struct periodic_options *out_options,
-                        const struct estimate_method **out_method, struct error *out_error)
+static int read_order(const struct arguments *arguments, struct estimate_options *io_options, struct error *out_error)
 {
-    *out_options = (struct periodic_options){
-        .input = arguments->input,
-        .output = arguments->output,
-        .period_samples = (size_t)arguments->period_samples,
-    };
-    if (arguments->reference) {
-        return error_set(
-            out_error, error_usage,
-            "--reference: '%s' is for method indirect, which is not in this build (the mean over periods needs "
-            "none, in closed loop either)",
-            arguments->reference);
+    double order = estimate_order_auto;
+    if (arguments->order && strcmp(arguments->order, "auto") != 0 &&
+        (options_parse_number("--order", arguments->order, &order, NULL) ||
+         !(order >= 0.0 && order <= estimate_order_max && order == floor(order)))) {
+        return error_set(out_error, error_usage, "--order: '%s', expected a whole number from 0 to %d or auto",
+                         arguments->order, estimate_order_max);
     }
-    *out_method = estimate_method_find(arguments->method, out_error);
-    return *out_method ? read_settle(arguments, out_options, out_error) : error_usage;
+    io_options->order = (int)order;
+    return 0;
+}
+
+/// What is for method parametric alone.
+static int read_parametric(const struct arguments *arguments, struct estimate_options *io_options,
+                           struct error *out_error)
+{
+    const char *given = arguments->domain       ? "domain"
+                        : arguments->delay_free ? "delay-free"
+                        : arguments->model_out  ? "model-out"
+                                                : NULL;
+    if (given && strcmp(arguments->method, "parametric") != 0) {
+        return error_set(out_error, error_usage, "--%s is for --method parametric, not %s", given, arguments->method);
+    }
+    if (arguments->model_out && arguments->runs.count > 1) {
+        return error_set(out_error, error_usage, "--model-out: %zu runs give as many models, expected one run",
+                         arguments->runs.count);
+    }
+    const char *domain = arguments->domain ? arguments->domain : "discrete";
+    if (strcmp(domain, "discrete") != 0 && strcmp(domain, "continuous") != 0) {
+        return error_set(out_error, error_usage, "--domain: '%s', expected discrete or continuous", domain);
+    }
+    io_options->continuous = strcmp(domain, "continuous") == 0;
+    io_options->delay_free = arguments->delay_free;
+    io_options->model_path = arguments->model_out;
+    return 0;
+}
+
+static int read_request(const struct arguments *arguments, struct request *out_request, struct error *out_error)
+{
+    *out_request = (struct request){
+        .method = estimate_method_find(arguments->method, out_error),
+        .cut = {.input = arguments->input,
+                .output = arguments->output,
+                .reference = arguments->reference,
+                .period_samples = (size_t)arguments->period_samples},
+        .tuning = {.half_width = (size_t)arguments->half_width, .segment_samples = (size_t)arguments->segment_samples},
+    };
+    if (!out_request->method) {
+        return error_usage;
+    }
+    out_request->cut.settle = out_request->method->models_transient ? periodic_settle_keep : periodic_settle_default;
+    int status = arguments->hold ? setup_hold_parse(arguments->hold, &out_request->hold, out_error) : 0;
+    status = status ? status : read_order(arguments, &out_request->tuning, out_error);
+    status = status ? status : read_parametric(arguments, &out_request->tuning, out_error);
+    return status ? status : read_settle(arguments, &out_request->cut, out_error);
 }
 
 /// --lines needs the run's rate and period, so that it is read once per run.
@@ -129,9 +186,9 @@ static int read_lines(const struct arguments *arguments, const struct run *run, 
     return status;
 }
 
-static void summarise(const struct periodic *recording, struct summary *out_summary)
+static void summarise(const struct periodic *recording, struct estimating_summary *out_summary)
 {
-    *out_summary = (struct summary){
+    *out_summary = (struct estimating_summary){
         .period_samples = recording->period_samples,
         .total = recording->total,
         .settle = recording->settle,
@@ -144,259 +201,400 @@ static void summarise(const struct periodic *recording, struct summary *out_summ
         .first_level = recording->output_level[0],
         .last_level = recording->output_level[recording->total - 1],
     };
+    estimate_advise(recording, &out_summary->advice);
 }
 
-static int estimate_run(const char *path, const struct arguments *arguments, struct periodic_options options,
-                        const struct estimate_method *method, struct frf *out_frf, struct summary *out_summary,
-                        struct error *out_error)
+static int estimate_without_period(const struct run *run, const struct request *request, struct frf *out_frf,
+                                   struct estimating_summary *out_summary, struct error *out_error)
 {
-    const struct run_options run_options = {.map = arguments->map, .rate_hz = arguments->rate_hz};
-    struct run run;
-    struct design_lines lines;
-    struct periodic recording;
-    int status = run_read(path, &run_options, &run, out_error);
+    const struct arbitrary_options options = {
+        .input = request->cut.input, .output = request->cut.output, .reference = request->cut.reference};
+    struct arbitrary recording;
+    if (request->cut.settle == periodic_settle_given && request->cut.settle_periods > 0) {
+        return error_set(out_error, error_usage, "--settle: %s has no periods to leave out", run->path);
+    }
+    int status = arbitrary_cut(run, &options, &recording, out_error);
     if (status) {
         return status;
     }
-    status = read_lines(arguments, &run, &options, &lines, out_error);
-    status = status ? status : periodic_cut(&run, &options, &recording, out_error);
-    if (!status) {
-        status = method->estimate(&recording, out_frf, out_error);
-        summarise(&recording, out_summary);
-        periodic_free(&recording);
+    *out_summary =
+        (struct estimating_summary){.without_period = true, .rows = recording.rows, .lost_rows = recording.lost};
+    estimate_advise_arbitrary(&recording, &out_summary->advice);
+    return request->method->estimate_arbitrary(&recording, &request->tuning, out_frf, out_error);
+}
+
+static int estimate_periods(const struct run *run, const struct request *request, const struct inputs *inputs,
+                            struct frf *out_frf, struct estimating_summary *out_summary, struct error *out_error)
+{
+    struct periodic recording;
+    int status = periodic_cut(run, &request->cut, &recording, out_error);
+    if (status && recording.aperiodic && request->method->estimate_arbitrary) {
+        return estimate_without_period(run, request, out_frf, out_summary, out_error);
     }
-    design_lines_free(&lines);
-    run_free(&run);
+    if (status) {
+        return status;
+    }
+    status = request->method->estimate(&recording, &request->tuning, out_frf, out_error);
+    summarise(&recording, out_summary);
+    if (!status && !estimating_findings_measure(&recording, inputs, out_frf, &out_summary->findings)) {
+        status = estimate_refuse_memory(out_frf, out_error);
+    }
+    periodic_free(&recording);
     return status;
 }
 
-static size_t valid_lines(const struct frf *frf)
+static int estimate_run(const char *path, const struct arguments *arguments, struct request request,
+                        struct frf *out_frf, struct estimating_summary *out_summary, struct error *out_error)
 {
-    size_t count = 0;
-    for (size_t line = 0; line < frf->count; line++) {
-        count += frf->valid[line];
+    const struct run_options run_options = {.map = arguments->map, .rate_hz = arguments->rate_hz};
+    const char *needs_whole = strcmp(request.method->name, "mean") != 0 ? request.method->name : NULL;
+    struct estimating_pieces pieces;
+    struct design_lines lines = {0};
+    struct inputs inputs = {0};
+    int status = estimating_matrix_read(request.matrix, path, &run_options, needs_whole, request.cut.period_samples,
+                                        &pieces, out_error);
+    if (status) {
+        return status;
     }
-    return count;
+    const struct run *run = &pieces.run;
+    pieces.context = request.context;
+    status = estimating_matrix_begin(request.matrix, run, out_error);
+    status = status ? status : read_lines(arguments, run, &request.cut, &lines, out_error);
+    status = status ? status : estimating_matrix_lines(request.matrix, run, &request.cut, &inputs, out_error);
+    if (!status && request.segment) {
+        status = estimating_check_table(run, request.segment, out_error);
+    }
+    const struct inputs *several = inputs.count > 0 ? &inputs : NULL;
+    if (!status && pieces.stream) {
+        status = estimating_pieces_estimate(&pieces, &request.cut, several, out_frf, out_summary, out_error);
+    } else if (!status) {
+        status = estimate_periods(run, &request, several, out_frf, out_summary, out_error);
+    }
+    design_lines_free(&lines);
+    inputs_free(&inputs);
+    estimating_matrix_give_back(request.matrix, &pieces);
+    return status;
 }
 
-/// Median over the valid lines of std / |G|.
-static double median_relative_std(const struct frf *frf)
+/// The runs of a sequence on their way through estimate_run().
+struct segments_context {
+    const struct arguments *arguments;
+    const struct request *request;
+    struct estimating_summary *whole;
+};
+
+/// Of several segments the one that settled worst speaks for all.
+static void merge_summary(struct estimating_summary *whole, const struct estimating_summary *one)
 {
-    double best = NAN;
-    double *values = malloc(frf->count * sizeof *values);
-    size_t count = 0;
-    for (size_t line = 0; values && line < frf->count; line++) {
-        double magnitude = hypot(frf->real[line], frf->imag[line]);
-        if (frf->valid[line] && magnitude > 0.0) {
-            values[count++] = frf->std[line] / magnitude;
-        }
+    struct estimating_summary before = *whole;
+    if (before.used_most == 0 || one->last_level > before.last_level) {
+        *whole = *one;
+        whole->findings = before.findings;
     }
-    if (count > 0) {
-        best = statistics_median(values, count);
-    }
-    free(values);
-    return best;
+    whole->used = before.used_most == 0 || one->used < before.used ? one->used : before.used;
+    whole->used_most = one->used > before.used_most ? one->used : before.used_most;
+    whole->lost = before.lost + one->lost;
+    whole->first_lost_row = before.lost > 0 ? before.first_lost_row : one->first_lost_row;
 }
 
-static const char *key_of(const struct frf *frf, const char *key)
+static int estimate_segment(void *context, const char *path, const struct run_sequence_segment *segment,
+                            struct frf *out_frf, struct error *out_error)
 {
-    for (size_t i = 0; i < frf->key_count; i++) {
-        if (strcmp(frf->keys[i].key, key) == 0) {
-            return frf->keys[i].value;
-        }
+    const struct segments_context *self = context;
+    struct request request = *self->request;
+    struct estimating_summary one = {.used = 0};
+    request.segment = segment;
+    int status = estimate_run(path, self->arguments, request, out_frf, &one, out_error);
+    if (!status) {
+        merge_summary(self->whole, &one);
+        status = estimating_findings_merge(&self->whole->findings, &one.findings)
+                     ? 0
+                     : estimate_refuse_memory(out_frf, out_error);
     }
-    return "";
+    estimating_findings_free(&one.findings);
+    return status;
 }
 
-static void print_run(const char *path, const struct summary *run)
+/// A run, or all runs of the manifest of a sequence as one.
+static int estimate_source(const char *path, const struct arguments *arguments, const struct request *request,
+                           struct frf *out_frf, struct estimating_summary *out_summary, struct error *out_error)
 {
-    printf("%s: %zu of %zu periods of %zu samples count, %zu left out for settling", path, run->used, run->total,
-           run->period_samples, run->settle);
-    if (run->lost > 0) {
-        printf(", %zu for lost samples (the first in row %zu)", run->lost, run->first_lost_row);
+    if (!manifest_is(path)) {
+        return estimate_run(path, arguments, *request, out_frf, out_summary, out_error);
     }
-    printf("%s%s\n", run->period_found ? "; period found by its repetition" : "",
-           run->bins_found ? "; lines found by their power" : "");
-    printf("  output differs from the later half by %.3g of its size in the first period, by %.3g in the last",
-           run->first_level, run->last_level);
-    if (run->transient.decay_per_period > 0.0) {
-        printf("; a transient falls to %.3g per period", run->transient.decay_per_period);
+    if (arguments->lines) {
+        return error_set(out_error, error_usage, "--lines: '%s': each run of the sequence %s says its lines itself",
+                         arguments->lines, path);
     }
-    if (!run->transient.settled) {
-        printf(run->total < 4 ? "; too few periods to judge the settling"
-                              : "; the first half has not settled or is not repeatable");
-    }
-    putchar('\n');
+    struct estimating_segments segments;
+    struct segments_context context = {arguments, request, out_summary};
+    int status = estimating_sequence(path, estimate_segment, &context, out_frf, &segments, out_error);
+    out_summary->segments = segments;
+    return status;
 }
 
-static void print_summary(const char *path, const struct frf *frf)
+static int print_json(cJSON *object, struct error *out_error)
 {
-    printf("%s: %s to %s by method %s, %zu of %zu lines valid, %.6g..%.6g Hz\n", path, frf->input, frf->output,
-           frf->method, valid_lines(frf), frf->count, frf->frequency_hz[0], frf->frequency_hz[frf->count - 1]);
-    printf("  std/|G| %.3g (median); 95 %% of errors lie within %s std (%.3g degrees of freedom)\n",
-           median_relative_std(frf), key_of(frf, "confidence_95_factor"), frf->degrees_of_freedom);
-}
-
-static cJSON *json_of_run(const char *path, const struct summary *run)
-{
-    cJSON *object = cJSON_CreateObject();
-    cJSON_AddStringToObject(object, "run", path);
-    cJSON_AddNumberToObject(object, "period_samples", (double)run->period_samples);
-    cJSON_AddBoolToObject(object, "period_found", run->period_found);
-    cJSON_AddBoolToObject(object, "lines_found", run->bins_found);
-    cJSON_AddNumberToObject(object, "periods_total", (double)run->total);
-    cJSON_AddNumberToObject(object, "settle_periods", (double)run->settle);
-    cJSON_AddNumberToObject(object, "lost_periods", (double)run->lost);
-    cJSON_AddNumberToObject(object, "periods", (double)run->used);
-    cJSON_AddBoolToObject(object, "settled", run->transient.settled);
-    cJSON_AddNumberToObject(object, "transient_first_period", run->first_level);
-    cJSON_AddNumberToObject(object, "transient_decay_per_period",
-                            run->transient.decay_per_period > 0.0 ? run->transient.decay_per_period : NAN);
-    return object;
-}
-
-static int print_json(const struct arguments *arguments, const struct frf *frf, const struct summary *runs,
-                      struct error *out_error)
-{
-    cJSON *object = cJSON_CreateObject();
-    cJSON_AddStringToObject(object, "out", arguments->out);
-    cJSON_AddStringToObject(object, "method", frf->method);
-    cJSON_AddStringToObject(object, "input", frf->input);
-    cJSON_AddStringToObject(object, "output", frf->output);
-    cJSON_AddStringToObject(object, "units", frf->units);
-    cJSON_AddNumberToObject(object, "lines", (double)frf->count);
-    cJSON_AddNumberToObject(object, "lines_valid", (double)valid_lines(frf));
-    cJSON_AddNumberToObject(object, "periods", (double)frf->periods);
-    cJSON_AddNumberToObject(object, "degrees_of_freedom", frf->degrees_of_freedom);
-    cJSON_AddNumberToObject(object, "confidence_95_factor", atof(key_of(frf, "confidence_95_factor")));
-    cJSON_AddNumberToObject(object, "median_relative_std", median_relative_std(frf));
-    cJSON *list = cJSON_AddArrayToObject(object, "runs");
-    for (size_t r = 0; r < arguments->runs.count; r++) {
-        cJSON_AddItemToArray(list, json_of_run(arguments->runs.items[r], &runs[r]));
-    }
     int status = json_print_stdout(object, out_error);
     cJSON_Delete(object);
     return status;
 }
 
-static int write_page(const char *path, const struct frf *frf, struct error *out_error)
-{
-    struct atomic_file file;
-    struct page page;
-    FILE *stream = atomic_file_open(&file, path, out_error);
-    if (!stream) {
-        return error_refused;
-    }
-    page_start(&page, stream, "Frequency response", NULL);
-    frf_report_section(&page, frf, NULL);
-    page_end(&page, NULL);
-    return atomic_file_commit(&file, out_error);
-}
-
-static int write_and_report(const struct arguments *arguments, const struct frf *frf, const struct summary *runs,
+static int write_and_report(const struct arguments *arguments, const struct estimating_outcome *outcome,
                             const struct command_context *context, struct error *out_error)
 {
-    int status = frf_write(arguments->out, frf, out_error);
+    int status = frf_write(arguments->out, &outcome->frf, out_error);
     if (!status && arguments->report) {
-        status = write_page(arguments->report, frf, out_error);
+        status = estimating_outcome_write_page(arguments->report, outcome, 1, out_error);
     }
     if (status) {
         return status;
     }
     if (context->json) {
-        return print_json(arguments, frf, runs, out_error);
+        return print_json(estimating_outcome_json(outcome, &arguments->runs, arguments->out), out_error);
     }
-    if (context->quiet) {
-        return 0;
+    if (!context->quiet) {
+        estimating_outcome_print(outcome, &arguments->runs, arguments->out);
     }
-    for (size_t r = 0; r < arguments->runs.count; r++) {
-        print_run(arguments->runs.items[r], &runs[r]);
-    }
-    print_summary(arguments->out, frf);
     return 0;
 }
 
-static int estimate_all(const struct arguments *arguments, const struct periodic_options *options,
-                        const struct estimate_method *method, struct frf *responses, struct summary *runs,
+/// Several runs are realisations.
+static int combine(const struct arguments *arguments, struct frf *responses, struct estimating_outcome *io_outcome,
+                   struct error *out_error)
+{
+    if (arguments->runs.count == 1) {
+        io_outcome->frf = responses[0];
+        responses[0] = (struct frf){0};
+        return 0;
+    }
+    int status = estimate_average(responses, arguments->runs.count, &io_outcome->frf, out_error);
+    if (!status && !agreement_measure(responses, arguments->runs.count, &io_outcome->findings.agreed)) {
+        status = estimate_refuse_memory(&io_outcome->frf, out_error);
+    }
+    return status;
+}
+
+/// What the response is one of, and what its runs show beside it, as its keys.
+static int finish(const struct arguments *arguments, const struct request *request,
+                  struct estimating_outcome *io_outcome, struct error *out_error)
+{
+    bool done = true;
+    for (size_t r = 0; r < arguments->runs.count && done; r++) {
+        done = estimating_findings_merge(&io_outcome->findings, &io_outcome->runs[r].findings);
+    }
+    setup_remove_delay(&io_outcome->frf, arguments->delay_s);
+    done = done && setup_set_keys(&io_outcome->frf, request->hold, arguments->delay_s) &&
+           estimating_findings_set_keys(&io_outcome->findings, &io_outcome->frf);
+    return done ? 0 : estimate_refuse_memory(&io_outcome->frf, out_error);
+}
+
+static int estimate_all(const struct arguments *arguments, const struct request *request,
+                        struct estimating_outcome *out, struct error *out_error)
+{
+    const size_t count = arguments->runs.count;
+    struct frf *responses = calloc(count, sizeof *responses);
+    *out = (struct estimating_outcome){.runs = calloc(count, sizeof *out->runs)};
+    int status = responses && out->runs ? 0 : error_set(out_error, error_refused, "memory is short");
+    out->run_count = out->runs ? count : 0;
+    for (size_t r = 0; r < count && !status; r++) {
+        status = estimate_source(arguments->runs.items[r], arguments, request, &responses[r], &out->runs[r], out_error);
+    }
+    status = status ? status : combine(arguments, responses, out, out_error);
+    status = status ? status : finish(arguments, request, out, out_error);
+    for (size_t r = 0; r < count && responses; r++) {
+        frf_free(&responses[r]);
+    }
+    free(responses);
+    return status;
+}
+
+/// One output from one input of a machine with several.
+static int estimate_pair(const struct arguments *arguments, const struct request *request, size_t pair,
+                         struct arguments *out_pair, struct estimating_outcome *out, struct error *out_error)
+{
+    const struct estimating_matrix *matrix = request->matrix;
+    const size_t output = pair / matrix->input_count;
+    const size_t input = pair % matrix->input_count;
+    struct request one = *request;
+    char *path = estimating_matrix_path(matrix, arguments->out, output, input);
+    *out_pair = *arguments;
+    out_pair->out = path;
+    one.cut.input = matrix->inputs[input];
+    one.cut.output = matrix->outputs[output];
+    if (!path) {
+        return error_set(out_error, error_refused, "memory is short");
+    }
+    const char *const outputs[] = {path};
+    int status = outputs_check(arguments->runs.items, arguments->runs.count, outputs, 1, out_error);
+    return status ? status : estimate_all(out_pair, &one, out, out_error);
+}
+
+static cJSON *json_of_pairs(const struct arguments *arguments, const struct estimating_matrix *matrix,
+                            const struct arguments *pairs, const struct estimating_outcome *outcomes)
+{
+    cJSON *object = cJSON_CreateObject();
+    cJSON_AddStringToObject(object, "out", arguments->out);
+    cJSON *inputs = cJSON_AddArrayToObject(object, "inputs");
+    for (size_t i = 0; i < matrix->input_count; i++) {
+        cJSON_AddItemToArray(inputs, cJSON_CreateString(matrix->inputs[i]));
+    }
+    cJSON *outputs = cJSON_AddArrayToObject(object, "outputs");
+    for (size_t i = 0; i < matrix->output_count; i++) {
+        cJSON_AddItemToArray(outputs, cJSON_CreateString(matrix->outputs[i]));
+    }
+    cJSON *responses = cJSON_AddArrayToObject(object, "responses");
+    for (size_t i = 0; i < matrix->input_count * matrix->output_count; i++) {
+        cJSON_AddItemToArray(responses, estimating_outcome_json(&outcomes[i], &pairs[i].runs, pairs[i].out));
+    }
+    return object;
+}
+
+static int report_pairs(const struct arguments *arguments, const struct estimating_matrix *matrix,
+                        const struct arguments *pairs, const struct estimating_outcome *outcomes,
                         const struct command_context *context, struct error *out_error)
 {
+    const size_t count = matrix->input_count * matrix->output_count;
     int status = 0;
-    for (size_t r = 0; r < arguments->runs.count && !status; r++) {
-        status =
-            estimate_run(arguments->runs.items[r], arguments, *options, method, &responses[r], &runs[r], out_error);
+    for (size_t i = 0; i < count && !status; i++) {
+        status = frf_write(pairs[i].out, &outcomes[i].frf, out_error);
     }
-    if (status) {
-        return status;
+    if (!status && arguments->report) {
+        status = estimating_outcome_write_page(arguments->report, outcomes, count, out_error);
     }
-    if (arguments->runs.count == 1) {
-        return write_and_report(arguments, &responses[0], runs, context, out_error);
+    if (!status && context->json) {
+        return print_json(json_of_pairs(arguments, matrix, pairs, outcomes), out_error);
     }
-    struct frf average;
-    status = estimate_average(responses, arguments->runs.count, &average, out_error);
-    if (!status) {
-        status = write_and_report(arguments, &average, runs, context, out_error);
-        frf_free(&average);
+    for (size_t i = 0; i < count && !status && !context->quiet; i++) {
+        estimating_outcome_print(&outcomes[i], &pairs[i].runs, pairs[i].out);
     }
+    return status;
+}
+
+static int estimate_matrix(const struct arguments *arguments, const struct request *request,
+                           const struct command_context *context, struct error *out_error)
+{
+    const size_t count = request->matrix->input_count * request->matrix->output_count;
+    if (arguments->model_out) {
+        return error_set(out_error, error_usage,
+                         "--model-out: %zu responses give as many models, expected --input COLUMN "
+                         "and --output COLUMN too",
+                         count);
+    }
+    struct arguments *pairs = calloc(count, sizeof *pairs);
+    struct estimating_outcome *outcomes = calloc(count, sizeof *outcomes);
+    int status = pairs && outcomes ? 0 : error_set(out_error, error_refused, "memory is short");
+    for (size_t i = 0; i < count && !status; i++) {
+        status = estimate_pair(arguments, request, i, &pairs[i], &outcomes[i], out_error);
+    }
+    status = status ? status : report_pairs(arguments, request->matrix, pairs, outcomes, context, out_error);
+    for (size_t i = 0; i < count && pairs && outcomes; i++) {
+        free((char *)pairs[i].out);
+        estimating_outcome_free(&outcomes[i]);
+    }
+    free(pairs);
+    free(outcomes);
+    return status;
+}
+
+static int estimate_and_report(const struct arguments *arguments, const struct request *request,
+                               const struct command_context *context, struct error *out_error)
+{
+    struct estimating_outcome outcome;
+    int status = estimate_all(arguments, request, &outcome, out_error);
+    if (status == estimating_is_matrix) {
+        status = estimate_matrix(arguments, request, context, out_error);
+    } else if (!status) {
+        status = write_and_report(arguments, &outcome, context, out_error);
+    }
+    estimating_outcome_free(&outcome);
     return status;
 }
 
 static int run(int argc, char **argv, const struct command_context *context, struct error *out_error)
 {
     struct arguments arguments = {.method = "mean"};
-    struct periodic_options options;
-    const struct estimate_method *method = NULL;
+    struct estimating_matrix matrix = {.allowed = false};
+    struct request request;
     int status = read_options(argc, argv, &arguments, out_error);
-    status = status ? status : read_request(&arguments, &options, &method, out_error);
-    const char *outputs[] = {arguments.out, arguments.report};
-    status = status ? status : outputs_check(arguments.runs.items, arguments.runs.count, outputs, 2, out_error);
-    if (status) {
-        return status;
+    status = status ? status : read_request(&arguments, &request, out_error);
+    const char *outputs[] = {arguments.out, arguments.report, arguments.model_out};
+    status = status ? status : outputs_check(arguments.runs.items, arguments.runs.count, outputs, 3, out_error);
+    const struct estimating_matrix_request asked = {arguments.design, arguments.input, arguments.output,
+                                                    arguments.lines};
+    status = status ? status : estimating_matrix_open(&asked, &matrix, out_error);
+    if (!status) {
+        request.matrix = &matrix;
+        request.context = context;
+        status = estimate_and_report(&arguments, &request, context, out_error);
     }
-    struct frf *responses = calloc(arguments.runs.count, sizeof *responses);
-    struct summary *runs = calloc(arguments.runs.count, sizeof *runs);
-    if (!responses || !runs) {
-        status = error_set(out_error, error_refused, "memory is short");
-    } else {
-        status = estimate_all(&arguments, &options, method, responses, runs, context, out_error);
-    }
-    for (size_t r = 0; r < arguments.runs.count && responses; r++) {
-        frf_free(&responses[r]);
-    }
-    free(responses);
-    free(runs);
+    estimating_matrix_free(&matrix);
     return status;
 }
 
 const struct command command_cmd_frf = {
     .name = "frf",
     .summary = "frequency response of a periodic recording, with its standard deviation",
-    .help = "servoscope frf: frequency response of a periodic recording, with its standard deviation\n"
-            "\n"
-            "usage: servoscope frf RUN.csv [more.csv] [options] --out FRF.csv\n"
-            "\n"
-            "  --method mean        mean over periods, variance from their scatter (default)\n"
-            "  --method hann        Hann window over all periods: robust to what is left of a transient, 1.8 dB more "
-            "noise\n"
-            "  --settle S           leading periods to leave out; auto: found from the decay of the transient\n"
-            "                       (default: the run's settle_periods, else auto)\n"
-            "  --input COLUMN       default torque_Nm, else force_N, current_A, voltage_V\n"
-            "  --output COLUMN      default velocity_rad_per_s, velocity_m_per_s, else position\n"
-            "  --period SAMPLES     for a recording that does not say it (default: found by its repetition)\n"
-            "  --lines SPEC         as for servoscope design, e.g. linear:1:100:1 (default: the run's excited_bins, "
-            "else found\n"
-            "                       by their power)\n"
-            "  --map NAME=COLUMN[*SCALE],...  --rate HZ    for recordings of others\n"
-            "  --out FRF.csv        frequency_hz,real,imag,std,noise_std,...,valid\n"
-            "  --report FILE.html   a page: Bode diagram with its uncertainty\n"
-            "\n"
-            "Several runs are realisations: same lines, other phases. Their mean is the best linear approximation, std "
-            "its total\n"
-            "standard deviation (noise and nonlinear distortion), noise_std that of the noise alone.\n"
-            "Periods with lost samples (valid = 0) do not count. 95 % of errors lie within confidence_95_factor times "
-            "std, which\n"
-            "is more than 2 for few periods. The response includes the hold: torque held between samples.\n"
-            "\n"
-            "example:\n"
-            "  servoscope frf run.csv --out frf.csv\n",
+    .help =
+        "servoscope frf: frequency response of a periodic recording, with its standard deviation\n"
+        "\n"
+        "usage: servoscope frf RUN.csv [more.csv] [options] --out FRF.csv\n"
+        "\n"
+        "  --method mean        mean over periods, variance from their scatter (default)\n"
+        "  --method hann        Hann window over all periods: robust to what is left of a transient, 1.8 dB more "
+        "noise\n"
+        "  --method lpm         local polynomials: takes the transient out, so that no period is left out; works "
+        "without\n"
+        "                       a period too\n"
+        "  --method h1          cross spectrum over the input's power (Welch), for arbitrary signals; biased in a "
+        "closed loop\n"
+        "  --method indirect    output and input against the reference: arbitrary signals in a closed loop\n"
+        "  --method parametric  transfer function by maximum likelihood, its orders chosen from the data\n"
+        "  --domain DOMAIN      parametric: discrete (default: input held between samples) or continuous\n"
+        "  --delay-free         parametric: a delay is estimated too\n"
+        "  --model-out M.json   parametric: coefficients, poles, zeros, gain, with standard deviations\n"
+        "  --settle S           leading periods to leave out; auto: found from the decay of the transient\n"
+        "                       (default: the run's settle_periods, else auto; for lpm none)\n"
+        "  --input COLUMN       default torque_Nm, else force_N, current_A, voltage_V\n"
+        "  --output COLUMN      default velocity_rad_per_s, velocity_m_per_s, else position\n"
+        "  --reference COLUMN   what excites the loop, for indirect and lpm (default: set-point of velocity or "
+        "position, else\n"
+        "                       torque_ref_Nm)\n"
+        "  --order R|auto       lpm: order of the polynomials (default: 2, 4, ... until the variance stops "
+        "falling)\n"
+        "  --half-width LINES   lpm: lines on each side (default: what leaves 9 degrees of freedom)\n"
+        "  --segment SAMPLES    without a period: lines are one over so many samples apart\n"
+        "  --period SAMPLES     for a recording that does not say it (default: found by its repetition)\n"
+        "  --lines SPEC         as for servoscope design, e.g. linear:1:100:1 (default: the run's excited_bins, "
+        "else found\n"
+        "                       by their power)\n"
+        "  --map NAME=COLUMN[*SCALE],...  --rate HZ    for recordings of others\n"
+        "  --design D.json      several inputs: the manifest of design --inputs that says which lines are whose "
+        "(default:\n"
+        "                       found by their power)\n"
+        "  --hold HOLD          zoh (default): the input stays between samples; band-limited: it is measured behind "
+        "an\n"
+        "                       anti-alias filter. Said in the file; the numbers are the same\n"
+        "  --delay S            a known delay, taken out of the response\n"
+        "  --out FRF.csv        frequency_hz,real,imag,std,noise_std,...,valid\n"
+        "  --report FILE.html   a page: Bode diagram with its uncertainty\n"
+        "\n"
+        "The manifest that measure writes for a sequence (octaves, dwell) stands for all of its runs: each segment "
+        "is\n"
+        "estimated by itself, and their lines are put together.\n"
+        "Several runs are realisations: same lines, other phases. Their mean is the best linear approximation, std "
+        "its total\n"
+        "standard deviation (noise and nonlinear distortion), noise_std that of the noise alone.\n"
+        "Periods with lost samples (valid = 0) do not count. 95 % of errors lie within confidence_95_factor times "
+        "std, which\n"
+        "is more than 2 for few periods. The response includes the hold: torque held between samples.\n"
+        "Free bins between the lines (design odd:, random-odd:) show odd and even distortion, a dwell its harmonics. A "
+        "run with\n"
+        "torque_1_Nm, torque_2_Nm, ... gives a response for each output and input: FRF-OUTPUT-INPUT.csv. A response "
+        "that\n"
+        "repeats only after several periods is a warning: std does not hold then.\n"
+        "\n"
+        "example:\n"
+        "  servoscope frf run.csv --out frf.csv\n",
     .run = run,
 };

@@ -47,7 +47,7 @@ static int check_axis(const struct arguments *arguments, const struct measuring 
         return 0;
     }
     int status = model_file_read(path, &model, out_error);
-    bool linear = measuring->table.view.linear;
+    bool linear = measuring->linear;
     if (!status && linear != model.linear) {
         status = error_set(out_error, error_refused, "%s is of a %s axis, %s of a %s one: expected one kind",
                            arguments->measuring.table, linear ? "linear" : "rotary", path,

@@ -38,10 +38,10 @@ static int simulate(const struct arguments *arguments, struct sim_model *model, 
     if (status) {
         return status;
     }
-    if (measuring.table.view.linear != model->linear) {
+    if (measuring.linear != model->linear) {
         status = error_set(out_error, error_refused, "%s is of a %s axis, %s of a %s one: expected one kind",
-                           arguments->measuring.table, measuring.table.view.linear ? "linear" : "rotary",
-                           arguments->model, model->linear ? "linear" : "rotary");
+                           arguments->measuring.table, measuring.linear ? "linear" : "rotary", arguments->model,
+                           model->linear ? "linear" : "rotary");
     } else {
         struct direct_drive simulated;
         struct drive drive = direct_drive_init(&simulated, model);

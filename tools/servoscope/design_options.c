@@ -245,3 +245,69 @@ int design_options_resolve(const struct design_options *options, struct design_r
     status = status ? status : read_choices(options, out_request, out_error);
     return status ? status : resolve_axis(options, out_request, out_error);
 }
+
+/// The factor that brings a length of the option's unit to the axis': linear options of a rotary axis need the pulley.
+static int length_factor(const char *option, bool option_is_linear, const struct design_options *options,
+                         const struct design_request *request, double *out_factor, struct error *out_error)
+{
+    *out_factor = 1;
+    if (option_is_linear == request->linear) {
+        return 0;
+    }
+    if (option_is_linear && options->pulley_radius_m > 0) {
+        *out_factor = 1 / options->pulley_radius_m;
+        return 0;
+    }
+    return error_set(out_error, error_usage, "--%s is of a %s axis, the limits are of a %s one", option,
+                     option_is_linear ? "linear" : "rotary", request->linear ? "linear" : "rotary");
+}
+
+/// Reads "LENGTH:PERIODS".
+static int read_stroke(const char *option, const char *text, double factor, struct design_offset *out_offset,
+                       struct error *out_error)
+{
+    char length_text[64] = "";
+    char what[32];
+    double length = 0;
+    double periods = 0;
+    const char *colon = strchr(text, ':');
+    snprintf(what, sizeof what, "--%s", option);
+    snprintf(length_text, sizeof length_text, "%.*s", colon ? (int)(colon - text) : 63, text);
+    if (!colon || options_parse_number(what, length_text, &length, NULL) ||
+        options_parse_number(what, colon + 1, &periods, NULL) || !(length > 0) ||
+        !(periods >= 2 && periods <= 1e6 && periods == floor(periods))) {
+        return error_set(out_error, error_usage,
+                         "%s: '%s', expected AMPLITUDE:PERIODS, a positive amplitude and a whole number of at least 2 "
+                         "periods of the multisine, as in 0.5:8",
+                         what, text);
+    }
+    out_offset->stroke_rad = length * factor;
+    out_offset->stroke_periods = (size_t)periods;
+    return 0;
+}
+
+int design_options_offset(const struct design_options *options, const struct design_request *request,
+                          struct design_offset *out_offset, struct error *out_error)
+{
+    *out_offset = (struct design_offset){0};
+    if (options->stroke && options->stroke_m) {
+        return error_set(out_error, error_usage, "--stroke and --stroke-m are both given, expected one");
+    }
+    const bool linear_stroke = options->stroke_m != NULL;
+    const char *stroke = linear_stroke ? options->stroke_m : options->stroke;
+    const char *name = linear_stroke ? "stroke-m" : "stroke";
+    double factor = 1;
+    int status = 0;
+    if (stroke) {
+        status = length_factor(name, linear_stroke, options, request, &factor, out_error);
+        status = status ? status : read_stroke(name, stroke, factor, out_offset, out_error);
+    }
+    const bool linear_speed = fabs(options->bias_velocity_m_per_s) > 0;
+    const double speed = linear_speed ? options->bias_velocity_m_per_s : options->bias_velocity_rad_per_s;
+    if (!status && fabs(speed) > 0) {
+        status = length_factor(linear_speed ? "bias-velocity-m-per-s" : "bias-velocity", linear_speed, options, request,
+                               &factor, out_error);
+        out_offset->bias_velocity_rad_per_s = speed * factor;
+    }
+    return status;
+}

@@ -4,6 +4,7 @@
 #define SERVOSCOPE_TOOLS_DESIGN_OPTIONS_H
 
 #include "lab/design/design.h"
+#include "lab/design/offset.h"
 #include "lab/record/error.h"
 
 /// The options, before they are understood. Numbers that were not given are 0, texts NULL but where a default is said.
@@ -52,5 +53,10 @@ int design_options_read(int argc, char **argv, struct design_options *out_option
 /// Errors: error_usage with option, value and expectation
 int design_options_resolve(const struct design_options *options, struct design_request *out_request,
                            struct error *out_error);
+
+/// Fills in the travel that is added to the multisine, but for how long it is played.
+/// Errors: error_usage with option, value and expectation
+int design_options_offset(const struct design_options *options, const struct design_request *request,
+                          struct design_offset *out_offset, struct error *out_error);
 
 #endif

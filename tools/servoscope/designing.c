@@ -23,6 +23,7 @@ static int fill_table(const struct design_request *request, const struct design_
     out_table->rate_den = request->rate_denominator;
     out_table->start_index = (uint32_t)result->start_index;
     out_table->linear = request->linear;
+    out_table->travel_per_period = result->travel_per_period_rad;
     memcpy(out_table->bins, result->bins, result->bin_count * sizeof *result->bins);
     memcpy(out_table->torque, result->torque_Nm, samples * sizeof(double));
     memcpy(out_table->velocity, result->velocity_rad_per_s, samples * sizeof(double));

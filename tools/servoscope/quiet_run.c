@@ -49,7 +49,7 @@ int quiet_run_response(const struct sim_model *model, const struct msgen_table *
     }
     status = periodic_cut(&run, &options, &recording, out_error);
     if (!status) {
-        status = method->estimate(&recording, out_frf, out_error);
+        status = method->estimate(&recording, NULL, out_frf, out_error);
         periodic_free(&recording);
     }
     run_free(&run);
