@@ -52,10 +52,11 @@ FILE *atomic_file_open(struct atomic_file *self, const char *path, struct error 
         error_set(out_error, error_refused, "%s: is a folder, a file name was expected", path);
         return NULL;
     }
-    self->path = exists ? realpath(path, NULL) : strdup(path);
+    // A pipe behind /dev/stdout has no path of its own.
+    bool in_place = exists && !S_ISREG(old.st_mode);
+    self->path = exists && !in_place ? realpath(path, NULL) : strdup(path);
     int file = -1;
     if (self->path) {
-        bool in_place = exists && !S_ISREG(old.st_mode);
         file = in_place ? open(path, O_WRONLY | O_CLOEXEC) : create_temporary(self, exists ? &old : NULL);
     }
     if (file >= 0)

@@ -3,17 +3,28 @@
 
 #include "lab/record/atomic_file.h"
 #include "lab/record/number.h"
+#include "lab/record/record_table.h"
 #include "lab/record/text_table.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { column_frequency, column_real, column_imag, column_std, column_noise, column_odd, column_even, column_valid };
-enum { frf_columns = 8, frf_columns_required = 3 };
+enum {
+    column_frequency,
+    column_real,
+    column_imag,
+    column_std,
+    column_noise,
+    column_odd,
+    column_even,
+    column_valid,
+    column_coherence,
+};
+enum { frf_columns = 9, frf_columns_required = 3 };
 
 static const char *const column_names[frf_columns] = {
-    "frequency_hz", "real", "imag", "std", "noise_std", "odd_distortion", "even_distortion", "valid"};
+    "frequency_hz", "real", "imag", "std", "noise_std", "odd_distortion", "even_distortion", "valid", "coherence"};
 
 static const char *const text_keys[] = {"input", "output", "units", "method"};
 
@@ -46,11 +57,12 @@ int frf_alloc(struct frf *out_frf, size_t count, struct error *out_error)
     out_frf->noise_std = filled(room, FRF_UNKNOWN);
     out_frf->odd_distortion = filled(room, FRF_UNKNOWN);
     out_frf->even_distortion = filled(room, FRF_UNKNOWN);
+    out_frf->coherence = filled(room, FRF_UNKNOWN);
     out_frf->valid = calloc(room, sizeof *out_frf->valid);
     bool texts = frf_set_text(&out_frf->input, "") && frf_set_text(&out_frf->output, "") &&
                  frf_set_text(&out_frf->units, "") && frf_set_text(&out_frf->method, "");
     if (texts && out_frf->frequency_hz && out_frf->real && out_frf->imag && out_frf->std && out_frf->noise_std &&
-        out_frf->odd_distortion && out_frf->even_distortion && out_frf->valid)
+        out_frf->odd_distortion && out_frf->even_distortion && out_frf->coherence && out_frf->valid)
         return error_none;
     frf_free(out_frf);
     return error_set(out_error, error_refused, "memory is short for %zu frequencies", count);
@@ -70,6 +82,7 @@ void frf_free(struct frf *self)
     free(self->noise_std);
     free(self->odd_distortion);
     free(self->even_distortion);
+    free(self->coherence);
     free(self->valid);
     free(self->input);
     free(self->output);
@@ -96,6 +109,7 @@ static enum text_cell judge(void *context, const char *name)
     case column_noise:
     case column_odd:
     case column_even:
+    case column_coherence:
         return text_cell_number_or_empty;
     default:
         return text_cell_number;
@@ -124,6 +138,15 @@ static int locate_columns(const struct text_table *table, const double *out_colu
     return error_none;
 }
 
+/* The first magnitude of a row that is negative; frf_columns if there is none. */
+static int negative_magnitude(const double *const columns[frf_columns], size_t k)
+{
+    int i = column_std;
+    while (i < frf_columns && (i == column_valid || !columns[i] || !(columns[i][k] < 0)))
+        i++;
+    return i;
+}
+
 static int check_row(const struct text_table *table, const double *const columns[frf_columns], size_t k,
                      struct error *out_error)
 {
@@ -132,10 +155,14 @@ static int check_row(const struct text_table *table, const double *const columns
     double frequency_hz = columns[column_frequency][k];
     if (!(frequency_hz >= 0) || (k > 0 && !(frequency_hz > columns[column_frequency][k - 1])))
         wrong = "frequencies from 0 on, in ascending order, were expected";
-    for (int i = column_std; i <= column_even && !wrong; i++) {
+    for (int i = column_real; i <= column_imag && !wrong; i++) {
         column = i;
-        if (columns[i] && columns[i][k] < 0)
-            wrong = "a magnitude was expected: 0 or more, or an empty cell";
+        if (!isfinite(columns[i][k]))
+            wrong = "a number was expected";
+    }
+    if (!wrong && negative_magnitude(columns, k) < frf_columns) {
+        column = negative_magnitude(columns, k);
+        wrong = "a magnitude was expected: 0 or more, or an empty cell";
     }
     if (!wrong && columns[column_valid] && columns[column_valid][k] != 0 && columns[column_valid][k] != 1) {
         column = column_valid;
@@ -168,6 +195,7 @@ static int copy_columns(const struct text_table *table, struct frf *frf, struct 
     copy_magnitudes(frf->noise_std, columns[column_noise], frf->count);
     copy_magnitudes(frf->odd_distortion, columns[column_odd], frf->count);
     copy_magnitudes(frf->even_distortion, columns[column_even], frf->count);
+    copy_magnitudes(frf->coherence, columns[column_coherence], frf->count);
     for (size_t k = 0; k < frf->count; k++)
         frf->valid[k] = !columns[column_valid] || columns[column_valid][k] != 0;
     return error_none;
@@ -234,22 +262,25 @@ static int copy_keys(struct text_table *table, struct frf *frf, struct error *ou
     return status;
 }
 
+int frf_take_table(struct text_table *io_table, struct frf *out_frf, struct error *out_error)
+{
+    int status = frf_alloc(out_frf, io_table->rows, out_error);
+    if (!status)
+        status = copy_columns(io_table, out_frf, out_error);
+    if (!status)
+        status = copy_keys(io_table, out_frf, out_error);
+    text_table_free(io_table);
+    if (status)
+        frf_free(out_frf);
+    return status;
+}
+
 int frf_read(const char *path, struct frf *out_frf, struct error *out_error)
 {
     *out_frf = (struct frf){0};
     struct text_table table;
     int status = text_table_read(path, judge, NULL, &table, out_error);
-    if (status)
-        return status;
-    status = frf_alloc(out_frf, table.rows, out_error);
-    if (!status)
-        status = copy_columns(&table, out_frf, out_error);
-    if (!status)
-        status = copy_keys(&table, out_frf, out_error);
-    text_table_free(&table);
-    if (status)
-        frf_free(out_frf);
-    return status;
+    return status ? status : frf_take_table(&table, out_frf, out_error);
 }
 
 static int check_line(const char *path, const struct frf *frf, size_t k, struct error *out_error)
@@ -260,7 +291,7 @@ static int check_line(const char *path, const struct frf *frf, size_t k, struct 
     else if (!isfinite(frf->real[k]) || !isfinite(frf->imag[k]))
         wrong = "its response is not finite";
     else if (!isfinite(frf->std[k]) || !isfinite(frf->noise_std[k]) || !isfinite(frf->odd_distortion[k]) ||
-             !isfinite(frf->even_distortion[k]))
+             !isfinite(frf->even_distortion[k]) || (frf->coherence && !isfinite(frf->coherence[k])))
         wrong = "one of its deviations or distortions is not finite";
     if (!wrong)
         return error_none;
@@ -275,7 +306,7 @@ static void write_magnitude(FILE *stream, double value)
         text_write_number(stream, value);
 }
 
-static void write_keys(FILE *stream, const struct frf *frf)
+void frf_write_keys(FILE *stream, const struct frf *frf)
 {
     const char *const texts[] = {frf->input, frf->output, frf->units, frf->method};
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
@@ -292,7 +323,15 @@ static void write_keys(FILE *stream, const struct frf *frf)
         text_write_key(stream, &frf->keys[k]);
 }
 
-static void write_line(FILE *stream, const struct frf *frf, size_t k)
+static bool has_coherence(const struct frf *frf)
+{
+    for (size_t k = 0; frf->coherence && k < frf->count; k++)
+        if (frf_known(frf->coherence[k]))
+            return true;
+    return false;
+}
+
+static void write_line(FILE *stream, const struct frf *frf, size_t k, bool with_coherence)
 {
     text_write_number(stream, frf->frequency_hz[k]);
     fputc(',', stream);
@@ -303,7 +342,10 @@ static void write_line(FILE *stream, const struct frf *frf, size_t k)
     write_magnitude(stream, frf->noise_std[k]);
     write_magnitude(stream, frf->odd_distortion[k]);
     write_magnitude(stream, frf->even_distortion[k]);
-    fprintf(stream, ",%d\n", frf->valid[k] ? 1 : 0);
+    fprintf(stream, ",%d", frf->valid[k] ? 1 : 0);
+    if (with_coherence)
+        write_magnitude(stream, frf->coherence[k]);
+    fputc('\n', stream);
 }
 
 int frf_write(const char *path, const struct frf *frf, struct error *out_error)
@@ -319,11 +361,12 @@ int frf_write(const char *path, const struct frf *frf, struct error *out_error)
     FILE *stream = atomic_file_open(&file, path, out_error);
     if (!stream)
         return error_refused;
-    write_keys(stream, frf);
-    for (int i = 0; i < frf_columns; i++)
+    frf_write_keys(stream, frf);
+    bool with_coherence = has_coherence(frf);
+    for (int i = 0; i < (with_coherence ? frf_columns : column_coherence); i++)
         fprintf(stream, "%s%s", i ? "," : "", column_names[i]);
     fputc('\n', stream);
     for (size_t k = 0; k < frf->count; k++)
-        write_line(stream, frf, k);
+        write_line(stream, frf, k, with_coherence);
     return atomic_file_commit(&file, out_error);
 }

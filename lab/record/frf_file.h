@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /// Frequency response files: one line per frequency, values in SI units of output over input.
-/// Columns: frequency_hz,real,imag,std,noise_std,odd_distortion,even_distortion,valid. The first three are required;
-/// without `valid` every line is. Keys: input, output, units, method, periods, degrees_of_freedom; others are kept.
+/// Columns: frequency_hz,real,imag,std,noise_std,odd_distortion,even_distortion,valid, and coherence where a method
+/// gives it. The first three are required; without `valid` every line is. Keys: input, output, units, method, periods,
+/// degrees_of_freedom; others are kept.
 ///
 /// A number that was not estimated is an empty cell in the file and FRF_UNKNOWN in memory, never NaN and never 0: all
 /// of these columns are magnitudes, so that a negative number cannot be mistaken for one. A line that is not valid
@@ -28,6 +29,7 @@ struct frf {
     double *noise_std;      ///< the noise alone
     double *odd_distortion; ///< magnitudes in the units of the response
     double *even_distortion;
+    double *coherence; ///< of the output and what it was correlated with, 0..1; NULL is as good as all unknown
     bool *valid;
     char *input;               ///< column names: torque_Nm
     char *output;              ///< velocity_rad_per_s

@@ -33,7 +33,8 @@ static int read_text(const char *path, char **out_text, size_t *out_length, stru
             capacity = capacity ? 2 * capacity : 4096;
             char *grown = capacity <= document_size_max ? realloc(text, capacity) : NULL;
             if (!grown) {
-                status = error_set(out_error, error_refused, "%s: is larger than a model of a drive can be", path);
+                status = error_set(out_error, error_refused, "%s: is larger than %d MiB, the most for JSON", path,
+                                   document_size_max >> 20);
                 break;
             }
             text = grown;
@@ -172,21 +173,55 @@ static const char *find_member(const char *at, const char *name, size_t name_len
     return NULL;
 }
 
+/* The first character of element `index` of the array that starts at `at` ('['), NULL if it has fewer. */
+static const char *find_element(const char *at, size_t index)
+{
+    int depth = 0;
+    for (; *at; at++) {
+        bool begins = depth == 1 && index == 0 && !strchr(" \t\r\n,]", *at);
+        if (begins)
+            return at;
+        if (*at == '"')
+            at = skip_string(at) - 1;
+        depth += *at == '{' || *at == '[';
+        depth -= *at == '}' || *at == ']';
+        index -= depth == 1 && *at == ',' && index > 0;
+        if (depth == 0)
+            return NULL;
+    }
+    return NULL;
+}
+
+/* Follows "[2][0]" from the array at `at`; *io_member ends behind the last bracket. */
+static const char *follow_indices(const char *at, const char **io_member)
+{
+    while (at && **io_member == '[') {
+        char *end = NULL;
+        size_t index = strtoul(*io_member + 1, &end, 10);
+        at = *at == '[' ? find_element(at, index) : NULL;
+        *io_member = end + (*end == ']');
+    }
+    return at;
+}
+
 size_t json_document_line(const struct json_document *self, const char *member)
 {
     const char *at = self->text + strcspn(self->text, "{");
     for (;;) {
-        size_t length = strcspn(member, ".");
+        size_t length = strcspn(member, ".[");
         at = find_member(at, member, length);
         if (!at)
             return 0;
-        if (member[length] == '\0')
+        member += length;
+        if (*member == '\0')
             return line_of(self->text, at);
         at = skip_string(at);
-        at += strspn(at, " \t\r\n:");
-        if (*at != '{')
+        at = follow_indices(at + strspn(at, " \t\r\n:"), &member);
+        if (at && *member == '\0')
+            return line_of(self->text, at);
+        if (!at || *at != '{')
             return 0;
-        member += length + 1;
+        member++;
     }
 }
 

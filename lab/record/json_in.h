@@ -29,7 +29,8 @@ void json_document_free(struct json_document *self);
 /// "parent.name", or "name" for the root (parent NULL or ""); too long a path ends in dots.
 void json_path_join(char out_path[json_path_size], const char *parent, const char *name);
 
-/// Line of a member, named by its keys from the root joined by dots ("effects.cogging"); 0 if there is none.
+/// Line of a member, named by its keys from the root joined by dots and by indices from 0 ("effects.cogging",
+/// "segments[2].periods"); 0 if there is none.
 size_t json_document_line(const struct json_document *self, const char *member);
 
 /// Fills in "FILE:LINE: MEMBER: VALUE: expectation" and returns error_refused; `value` is NULL for a missing member.

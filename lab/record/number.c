@@ -13,37 +13,103 @@
 static const double exact_powers[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
                                       1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 
+/* 5^0 .. 5^27 are exact in 64 bits. */
+static const uint64_t powers_of_five[] = {
+    1,
+    5,
+    25,
+    125,
+    625,
+    3125,
+    15625,
+    78125,
+    390625,
+    1953125,
+    9765625,
+    48828125,
+    244140625,
+    1220703125,
+    6103515625,
+    30517578125,
+    152587890625,
+    762939453125,
+    3814697265625,
+    19073486328125,
+    95367431640625,
+    476837158203125,
+    2384185791015625,
+    11920928955078125,
+    59604644775390625,
+    298023223876953125,
+    1490116119384765625,
+    7450580596923828125,
+};
+
 enum {
     exact_power_max = 22,
-    exact_digits_max = 15, /* 10^15 < 2^53: every such integer is an exact double */
+    five_power_max = 27,
+    digits_max = 19, /* 10^19 < 2^64 */
     exponent_digits_max = 4,
 };
 
-/* A decimal number taken apart, as far as an exact value needs it. */
+static const uint64_t exact_integer_max = 9007199254740992u; /* 2^53 */
+
+/* A decimal number taken apart. */
 struct decimal {
-    uint64_t digits; /* the first exact_digits_max significant ones */
-    int significant; /* how many there were */
-    int scale;       /* value = digits 10^scale, if significant <= exact_digits_max */
+    uint64_t digits; /* the significant ones, if there are at most digits_max */
+    int significant; /* how many there are; leading zeros are none */
+    int scale;       /* value = digits 10^scale */
     bool negative;
-    bool exact;
+    bool plain; /* the exponent has few enough digits for `scale` to be right */
 };
 
 static bool is_digit(char c)
 {
-    return c >= '0' && c <= '9';
+    return (unsigned char)(c - '0') < 10;
 }
 
-static const char *scan_digits(const char *at, const char *end, bool fraction, struct decimal *io_decimal, bool *io_any)
+#if defined(__BYTE_ORDER__) && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+/* Eight digits at a time: neighbours are joined to numbers of two, four and eight digits, four, two and one at once. */
+static bool read_eight_digits(const char *at, uint64_t *out_value)
 {
-    for (; at < end && is_digit(*at); at++) {
-        *io_any = true;
-        if (io_decimal->significant > 0 || *at != '0')
-            io_decimal->significant++;
-        if (io_decimal->significant <= exact_digits_max)
-            io_decimal->digits = io_decimal->digits * 10 + (uint64_t)(*at - '0');
-        if (fraction && io_decimal->scale > -10000)
-            io_decimal->scale--;
+    uint64_t text;
+    memcpy(&text, at, sizeof text);
+    uint64_t high = text & 0xF0F0F0F0F0F0F0F0u;
+    uint64_t carried = (text + 0x0606060606060606u) & 0xF0F0F0F0F0F0F0F0u;
+    if ((high | carried >> 4) != 0x3333333333333333u)
+        return false;
+    text = (text & 0x0F0F0F0F0F0F0F0Fu) * (10u << 8 | 1u) >> 8;
+    text = (text & 0x00FF00FF00FF00FFu) * (100u << 16 | 1u) >> 16;
+    *out_value = (text & 0x0000FFFF0000FFFFu) * ((uint64_t)10000u << 32 | 1u) >> 32;
+    return true;
+}
+#else
+static bool read_eight_digits(const char *at, uint64_t *out_value)
+{
+    (void)at;
+    (void)out_value;
+    return false;
+}
+#endif
+
+/* Appends the digits at `at`; with more than digits_max of them io_digits overflows, and nobody looks at it. */
+static const char *scan_digits(const char *at, const char *end, uint64_t *io_digits)
+{
+    uint64_t digits = *io_digits, eight;
+    while (end - at >= 8 && read_eight_digits(at, &eight)) {
+        digits = digits * 100000000u + eight;
+        at += 8;
     }
+    for (; at < end && is_digit(*at); at++)
+        digits = digits * 10 + (uint64_t)(*at - '0');
+    *io_digits = digits;
+    return at;
+}
+
+static const char *skip_zeros(const char *at, const char *end)
+{
+    while (at < end && *at == '0')
+        at++;
     return at;
 }
 
@@ -62,25 +128,97 @@ static const char *scan_exponent(const char *at, const char *end, struct decimal
     for (; at < end && is_digit(*at); at++)
         exponent = exponent < 100000 ? exponent * 10 + (*at - '0') : exponent;
     io_decimal->scale += negative ? -exponent : exponent;
-    io_decimal->exact = at - first <= exponent_digits_max;
+    io_decimal->plain = at - first <= exponent_digits_max;
     return at > first ? at : NULL;
 }
 
-/* Checks the grammar [+-] digits [. digits] [e [+-] digits] over the whole text and collects its value on the way. */
-static bool scan_decimal(const char *at, const char *end, struct decimal *out_decimal)
+static int count_of(const char *from, const char *to)
 {
-    *out_decimal = (struct decimal){.exact = true};
-    bool any = false;
-    at = scan_sign(at, end, &out_decimal->negative);
-    at = scan_digits(at, end, false, out_decimal, &any);
-    if (at < end && *at == '.')
-        at = scan_digits(at + 1, end, true, out_decimal, &any);
-    if (any && at < end && (*at == 'e' || *at == 'E'))
-        at = scan_exponent(at + 1, end, out_decimal);
-    out_decimal->exact = out_decimal->exact && out_decimal->significant <= exact_digits_max &&
-                         abs(out_decimal->scale) <= exact_power_max;
-    return any && at == end;
+    return to - from < 10000 ? (int)(to - from) : 10000;
 }
+
+/* The longest number [+-] digits [. digits] [e [+-] digits] at `at`; returns where it ends, NULL if there is none. */
+static const char *scan_decimal(const char *at, const char *end, struct decimal *out_decimal)
+{
+    struct decimal decimal = {.plain = true};
+    at = scan_sign(at, end, &decimal.negative);
+    const char *whole = at, *first = skip_zeros(at, end);
+    at = scan_digits(first, end, &decimal.digits);
+    decimal.significant = count_of(first, at);
+    bool any = at > whole;
+    if (at < end && *at == '.') {
+        const char *fraction = at + 1;
+        first = decimal.significant == 0 ? skip_zeros(fraction, end) : fraction;
+        at = scan_digits(first, end, &decimal.digits);
+        decimal.significant += count_of(first, at);
+        decimal.scale = -count_of(fraction, at);
+        any = any || at > fraction;
+    }
+    if (any && at < end && (*at == 'e' || *at == 'E'))
+        at = scan_exponent(at + 1, end, &decimal);
+    *out_decimal = decimal;
+    return any ? at : NULL;
+}
+
+#ifdef __SIZEOF_INT128__
+__extension__ typedef unsigned __int128 uint128;
+
+/* digits 5^power or digits / 5^-power as 62 to 64 bits times a power of two. What those bits leave out is never zero
+ * and never half a last place of the 53 that a double has: it sets the lowest bit, so that rounding them to a double
+ * rounds as the exact value would. */
+static double scale_by_five(uint64_t digits, int power, int exponent)
+{
+    int shift = __builtin_clzll(digits);
+    uint64_t factor = powers_of_five[abs(power)];
+    int factor_shift = __builtin_clzll(factor);
+    uint128 product = (uint128)(digits << shift) << 63;
+    uint64_t bits, rest;
+    exponent -= shift;
+    if (power < 0) {
+        bits = (uint64_t)(product / (factor << factor_shift));
+        rest = (uint64_t)(product % (factor << factor_shift));
+        exponent += factor_shift - 63;
+    } else {
+        product = (product >> 63) * (factor << factor_shift);
+        bits = (uint64_t)(product >> 64);
+        rest = (uint64_t)product;
+        exponent += 64 - factor_shift;
+    }
+    return ldexp((double)(bits | (rest != 0)), exponent);
+}
+
+/* Whether the value is that of a double that is neither too large nor denormal, in so few operations that rounding can
+ * be seen to be right. */
+static bool convert_fast(const struct decimal *decimal, double *out_value)
+{
+    if (!decimal->plain || decimal->significant > digits_max)
+        return false;
+    double value = (double)decimal->digits;
+    int scale = decimal->scale;
+    if (decimal->digits <= exact_integer_max && abs(scale) <= exact_power_max)
+        // Both factors are exact doubles, so the one rounding of the product or quotient is strtod's.
+        value = scale < 0 ? value / exact_powers[-scale] : value * exact_powers[scale];
+    else if (decimal->digits > 0 && abs(scale) <= five_power_max)
+        value = scale_by_five(decimal->digits, scale, scale);
+    else
+        return false;
+    *out_value = decimal->negative ? -value : value;
+    return true;
+}
+#else
+static bool convert_fast(const struct decimal *decimal, double *out_value)
+{
+    int scale = decimal->scale;
+    if (!decimal->plain || decimal->significant > digits_max || decimal->digits > exact_integer_max ||
+        abs(scale) > exact_power_max)
+        return false;
+    // Both factors are exact doubles, so the one rounding of the product or quotient is strtod's.
+    double value = (double)decimal->digits;
+    value = scale < 0 ? value / exact_powers[-scale] : value * exact_powers[scale];
+    *out_value = decimal->negative ? -value : value;
+    return true;
+}
+#endif
 
 /* strtod reads the locale's decimal mark, so the point is replaced by it; the text has passed scan_decimal. */
 static double convert(const char *text, size_t length)
@@ -114,9 +252,9 @@ static enum number_status why_not(const char *at, const char *end)
     if (end - start >= 2 && start[0] == '0' && (start[1] == 'x' || start[1] == 'X'))
         return number_hexadecimal;
     const char *comma = memchr(at, ',', (size_t)(end - at));
-    struct decimal before, after;
-    if (comma && scan_decimal(at, comma, &before) && comma + 1 < end && is_digit(comma[1]) &&
-        scan_decimal(comma + 1, end, &after))
+    struct decimal part;
+    if (comma && scan_decimal(at, comma, &part) == comma && comma + 1 < end && is_digit(comma[1]) &&
+        scan_decimal(comma + 1, end, &part) == end)
         return number_decimal_comma;
     return number_not_a_number;
 }
@@ -131,20 +269,22 @@ enum number_status number_parse(const char *text, size_t length, double *out_val
     if (at == end)
         return number_empty;
     struct decimal decimal;
-    if (!scan_decimal(at, end, &decimal))
+    if (scan_decimal(at, end, &decimal) != end)
         return why_not(at, end);
-    if (decimal.exact) {
-        // Both factors are exact doubles, so the one rounding of the product or quotient is strtod's.
-        double value = (double)decimal.digits;
-        value = decimal.scale < 0 ? value / exact_powers[-decimal.scale] : value * exact_powers[decimal.scale];
-        *out_value = decimal.negative ? -value : value;
+    if (convert_fast(&decimal, out_value))
         return number_ok;
-    }
     double value = convert(at, (size_t)(end - at));
     if (!isfinite(value))
         return number_out_of_range;
     *out_value = value;
     return number_ok;
+}
+
+const char *number_read(const char *at, const char *end, double *out_value)
+{
+    struct decimal decimal;
+    const char *stop = scan_decimal(at, end, &decimal);
+    return stop && convert_fast(&decimal, out_value) ? stop : NULL;
 }
 
 const char *number_status_str(enum number_status status)

@@ -21,6 +21,12 @@ enum { number_text_size = 32 };
 /// Test: tests/unit/test_run_file.c
 enum number_status number_parse(const char *text, size_t length, double *out_value);
 
+/// Reads the number that begins at `at`, to the last bit, and returns where it ends. For numbers of up to 19 digits and
+/// powers of ten from -27 to 27, which is what recordings hold; NULL for others and for what is none: number_parse
+/// tells which.
+/// Test: tests/unit/test_run_file.c
+const char *number_read(const char *at, const char *end, double *out_value);
+
 /// What is wrong, to follow the quoted text in a message: "is not a number".
 const char *number_status_str(enum number_status status);
 

@@ -170,36 +170,38 @@ static int no_such_column(const struct text_table *table, const char *name, stru
 }
 
 /* One column of the table becomes what an entry says. `renamed` holds new names of the file's own columns. */
-static int apply_entry(const struct run_map_entry *entry, struct text_table *table, size_t own_count, char **renamed,
-                       double *scales, struct error *out_error)
+static int apply_entry(const struct run_map_entry *entry, struct text_table *table, char **renamed,
+                       struct run_map_plan *io_plan, struct error *out_error)
 {
     size_t source = 0;
-    while (source < own_count && strcmp(table->columns[source].name, entry->source) != 0)
+    while (source < io_plan->own_count && strcmp(table->columns[source].name, entry->source) != 0)
         source++;
-    if (source == own_count)
+    if (source == io_plan->own_count)
         return no_such_column(table, entry->source, out_error);
     char *name = copy_range(entry->name, entry->name + strlen(entry->name));
-    double *copy = renamed[source] ? malloc(table->rows * sizeof *copy) : NULL;
-    if (!name || (renamed[source] && !copy)) {
+    bool second = renamed[source] != NULL;
+    double *copy = second && table->rows > 0 ? malloc(table->rows * sizeof *copy) : NULL;
+    if (!name || (second && table->rows > 0 && !copy)) {
         free(name);
         free(copy);
         return error_set(out_error, error_refused, "%s: memory is short", table->path);
     }
-    if (!renamed[source]) {
+    if (!second) {
         renamed[source] = name;
-        scales[source] = entry->scale;
+        io_plan->scales[source] = entry->scale;
         return error_none;
     }
-    memcpy(copy, table->columns[source].data, table->rows * sizeof *copy);
-    scales[table->column_count] = entry->scale;
+    io_plan->sources[table->column_count] = source;
+    io_plan->scales[table->column_count] = entry->scale;
     table->columns[table->column_count++] = (struct run_column){name, copy};
     return error_none;
 }
 
-static int scale_column(const struct text_table *table, size_t column, double scale, struct error *out_error)
+static int scale_column(const struct text_table *table, size_t first, size_t column, double scale,
+                        struct error *out_error)
 {
     double *data = table->columns[column].data;
-    for (size_t n = 0; n < table->rows && scale != 1.0; n++) {
+    for (size_t n = first; n < table->rows && scale != 1.0; n++) {
         data[n] *= scale;
         if (isinf(data[n]))
             return error_set(out_error, error_refused, "%s:%zu: %s: too large for a double once scaled by %g",
@@ -236,42 +238,58 @@ static int take_names(const struct run_map *map, struct text_table *table, size_
     return error_none;
 }
 
-static int apply_all(const struct run_map *map, struct text_table *table, size_t own_count, char **renamed,
-                     double *scales, struct error *out_error)
+static int make_plan(const struct run_map *map, struct text_table *table, char **renamed, struct run_map_plan *io_plan,
+                     struct error *out_error)
 {
     int status = error_none;
     for (size_t i = 0; i < map->count && !status; i++)
-        status = apply_entry(&map->entries[i], table, own_count, renamed, scales, out_error);
-    if (!status)
-        status = take_names(map, table, own_count, renamed, out_error);
-    for (size_t c = 0; c < table->column_count && !status; c++)
-        status = scale_column(table, c, scales[c], out_error);
-    return status;
+        status = apply_entry(&map->entries[i], table, renamed, io_plan, out_error);
+    return status ? status : take_names(map, table, io_plan->own_count, renamed, out_error);
 }
 
-int run_map_apply(const struct run_map *map, struct text_table *io_table, struct error *out_error)
+int run_map_rename(const struct run_map *map, struct text_table *io_table, struct run_map_plan *out_plan,
+                   struct error *out_error)
 {
-    if (map->count == 0)
-        return error_none;
     size_t own_count = io_table->column_count, most = own_count + map->count;
     struct run_column *columns = realloc(io_table->columns, most * sizeof *columns);
     if (columns)
         io_table->columns = columns;
     char **renamed = calloc(own_count, sizeof *renamed);
-    double *scales = malloc(most * sizeof *scales);
+    *out_plan = (struct run_map_plan){.own_count = own_count,
+                                      .sources = calloc(most, sizeof *out_plan->sources),
+                                      .scales = malloc(most * sizeof *out_plan->scales)};
     int status = error_none;
-    if (columns && renamed && scales) {
+    if (columns && renamed && out_plan->sources && out_plan->scales) {
         for (size_t i = 0; i < most; i++)
-            scales[i] = 1.0;
-        status = apply_all(map, io_table, own_count, renamed, scales, out_error);
+            out_plan->scales[i] = 1.0;
+        status = make_plan(map, io_table, renamed, out_plan, out_error);
     } else {
         status = error_set(out_error, error_refused, "%s: memory is short", io_table->path);
     }
     for (size_t c = 0; renamed && c < own_count; c++)
         free(renamed[c]);
     free(renamed);
-    free(scales);
     if (status)
-        text_table_free(io_table);
+        run_map_plan_free(out_plan);
     return status;
+}
+
+int run_map_fill(const struct run_map_plan *plan, struct text_table *io_table, size_t first_row,
+                 struct error *out_error)
+{
+    size_t rows = io_table->rows - first_row;
+    for (size_t c = plan->own_count; c < io_table->column_count; c++)
+        memcpy(io_table->columns[c].data + first_row, io_table->columns[plan->sources[c]].data + first_row,
+               rows * sizeof(double));
+    int status = error_none;
+    for (size_t c = 0; c < io_table->column_count && !status; c++)
+        status = scale_column(io_table, first_row, c, plan->scales[c], out_error);
+    return status;
+}
+
+void run_map_plan_free(struct run_map_plan *self)
+{
+    free(self->sources);
+    free(self->scales);
+    *self = (struct run_map_plan){0};
 }

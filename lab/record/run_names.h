@@ -38,10 +38,25 @@ int run_map_parse(struct run_map *out_map, const char *text, struct error *out_e
 /// A text_table_judge whose context is a struct run_map: numbers are expected in known and in mapped columns.
 enum text_cell run_map_judge(void *context, const char *name);
 
-/// Renames and scales columns. A column that stands for two is copied; one whose name was given to another becomes
-/// unmapped_NAME.
-/// Errors: error_refused if a mapped column is missing, or a number leaves the range; *io_table is empty then.
-int run_map_apply(const struct run_map *map, struct text_table *io_table, struct error *out_error);
+/// What a map does to the rows of a table.
+struct run_map_plan {
+    size_t own_count; ///< columns of the file itself
+    size_t *sources;  ///< of each column behind them: the one that it repeats
+    double *scales;   ///< of each column
+};
+
+/// Renames columns, and adds one for each that stands for two. A column whose name was given to another becomes
+/// unmapped_NAME. Rows are left to run_map_fill.
+/// Errors: error_refused if a mapped column is missing; *out_plan is empty then
+int run_map_rename(const struct run_map *map, struct text_table *io_table, struct run_map_plan *out_plan,
+                   struct error *out_error);
+
+/// Copies and scales the rows from first_row on.
+/// Errors: error_refused if a number leaves the range
+int run_map_fill(const struct run_map_plan *plan, struct text_table *io_table, size_t first_row,
+                 struct error *out_error);
+
+void run_map_plan_free(struct run_map_plan *self);
 
 void run_map_free(struct run_map *self);
 
