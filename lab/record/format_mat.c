@@ -4,7 +4,8 @@
 
 #include <string.h>
 
-/* The text at the beginning, or the version and the mark of the byte order at the end of the 128 bytes of the header. */
+/* The text at the beginning, or the version and the mark of the byte order at the end of the 128 bytes of the header.
+ * */
 static enum format_match recognise(const unsigned char *head, size_t length)
 {
     bool text = length >= 7 && memcmp(head, "MATLAB ", 7) == 0;

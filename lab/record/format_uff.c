@@ -287,6 +287,23 @@ static int take_response(struct uff58 *f, struct text_table *table, struct error
     return record_table_add_column(table, "imag", imag, f->count, out_error);
 }
 
+/* The coherence of the same two places; all other functions are listed. */
+static int take_coherence(struct uff_file *file, const struct uff58 *f, struct text_table *table,
+                          struct format_notes *notes, struct error *out_error)
+{
+    int status = error_none;
+    for (size_t i = 0; i < file->count && !status; i++) {
+        struct uff58 *g = &file->functions[i];
+        bool coherence = g->function_type == uff_coherence && !g->complex && g->count == f->count &&
+                         same_place(&g->response, &f->response) && same_place(&g->reference, &f->reference);
+        if (coherence && !has_column(table, "coherence"))
+            status = move_column(g, "coherence", table, out_error);
+        else if (g != f)
+            format_notes_add(notes, format_lost, "function %zu (line %zu, '%s')", i + 1, g->line, g->id[0]);
+    }
+    return status;
+}
+
 static int take_foreign_frf(struct uff_file *file, struct uff58 *f, struct text_table *table,
                             struct format_notes *notes, struct error *out_error)
 {
@@ -307,16 +324,7 @@ static int take_foreign_frf(struct uff_file *file, struct uff58 *f, struct text_
         status = add_frequencies(f, table, out_error);
     if (!status)
         status = take_response(f, table, out_error);
-    for (size_t i = 0; i < file->count && !status; i++) {
-        struct uff58 *g = &file->functions[i];
-        bool coherence = g->function_type == uff_coherence && !g->complex && g->count == f->count &&
-                         same_place(&g->response, &f->response) && same_place(&g->reference, &f->reference);
-        if (coherence && !has_column(table, "coherence"))
-            status = move_column(g, "coherence", table, out_error);
-        else if (g != f)
-            format_notes_add(notes, format_lost, "function %zu (line %zu, '%s')", i + 1, g->line, g->id[0]);
-    }
-    return status;
+    return status ? status : take_coherence(file, f, table, notes, out_error);
 }
 
 /* Magnitudes that were not estimated are negative in a file of ours. */

@@ -200,7 +200,7 @@ static bool convert_fast(const struct decimal *decimal, double *out_value)
         value = scale < 0 ? value / exact_powers[-scale] : value * exact_powers[scale];
     else if (decimal->digits > 0 && abs(scale) <= five_power_max)
         value = scale_by_five(decimal->digits, scale, scale);
-    else
+    else if (decimal->digits > 0)
         return false;
     *out_value = decimal->negative ? -value : value;
     return true;

@@ -249,6 +249,17 @@ static struct form form_of(const struct uff58 *f, bool double_precision)
     return form;
 }
 
+/* What is wrong with the numbers of record 7; NULL if nothing is. */
+static const char *judge_form(const double *v, size_t count)
+{
+    if (!(count >= 5 && (v[0] == 2 || v[0] == 4 || v[0] == 5 || v[0] == 6)))
+        return "ordinate type 2, 4, 5 or 6 and five more numbers were expected";
+    if (!(v[1] >= 1 && v[1] < 1e12 && v[1] == floor(v[1])))
+        return "a number of values from 1 on was expected";
+    bool even = v[2] == 1 && (v[4] != 0 || v[1] == 1);
+    return v[2] == 0 || even ? NULL : "spacing 0, or 1 and a step other than 0, was expected";
+}
+
 static int read_form(struct reader *self, struct uff58 *f, struct form *out_form)
 {
     static const struct widths widths = {{10, 10, 10, 13, 13, 13}};
@@ -259,12 +270,9 @@ static int read_form(struct reader *self, struct uff58 *f, struct form *out_form
         status = split_line(self, &widths, v, &count);
     if (status)
         return status;
-    if (!(count >= 5 && (v[0] == 2 || v[0] == 4 || v[0] == 5 || v[0] == 6)))
-        return refuse(self, "ordinate type 2, 4, 5 or 6 and five more numbers were expected");
-    if (!(v[1] >= 1 && v[1] < 1e12 && v[1] == floor(v[1])))
-        return refuse(self, "a number of values from 1 on was expected");
-    if (!(v[2] == 0 || (v[2] == 1 && (v[4] != 0 || v[1] == 1))))
-        return refuse(self, "spacing 0, or 1 and a step other than 0, was expected");
+    const char *wrong = judge_form(v, count);
+    if (wrong)
+        return refuse(self, wrong);
     f->complex = v[0] >= 5;
     f->count = (size_t)v[1];
     f->even = v[2] == 1;
@@ -428,6 +436,16 @@ static int read_end(struct reader *self)
     return is_delimiter(self->text) ? error_none : refuse(self, "'    -1', the end of the dataset, was expected");
 }
 
+static int read_axes(struct reader *self, struct uff58 *f)
+{
+    int status = read_axis(self, "record 8, the abscissa's kind", &f->abscissa);
+    if (!status)
+        status = read_axis(self, "record 9, the ordinate's kind", &f->numerator);
+    if (!status)
+        status = read_axis(self, "record 10, the denominator's kind", &f->denominator);
+    return status ? status : read_axis(self, "record 11, the z axis' kind", &f->z_axis);
+}
+
 static int read_function(struct reader *self, struct uff58 *f)
 {
     struct binary binary = {0};
@@ -447,13 +465,7 @@ static int read_function(struct reader *self, struct uff58 *f)
     if (!status)
         status = read_form(self, f, &form);
     if (!status)
-        status = read_axis(self, "record 8, the abscissa's kind", &f->abscissa);
-    if (!status)
-        status = read_axis(self, "record 9, the ordinate's kind", &f->numerator);
-    if (!status)
-        status = read_axis(self, "record 10, the denominator's kind", &f->denominator);
-    if (!status)
-        status = read_axis(self, "record 11, the z axis' kind", &f->z_axis);
+        status = read_axes(self, f);
     if (!status)
         status = binary.on ? read_binary_values(self, f, &form, &binary) : read_text_values(self, f, &form);
     return status ? status : read_end(self);

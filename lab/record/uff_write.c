@@ -183,7 +183,8 @@ static bool add_line(struct key_lines *self, const char *beginning, const char *
 }
 
 /* One key; what a line does not hold goes on in the next, which begins with a mark. Blanks at a line's end are lost to
- * readers, so none ends there. Returns false if memory is short; *out_kept: whether the key has a form that reads back. */
+ * readers, so none ends there. Returns false if memory is short; *out_kept: whether the key has a form that reads back.
+ * */
 static bool add_key(struct key_lines *self, const struct run_key *key, bool *out_kept)
 {
     size_t size = strlen(key->key) + strlen(key->value) + 3, first_line = self->count;

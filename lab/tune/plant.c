@@ -49,18 +49,28 @@ static int find_units(const char *path, const struct frf *frf, struct tune_plant
                      path, input, output);
 }
 
+/// The number behind a key; untouched where the file does not have it.
+static int find_number(const char *path, const struct frf *frf, const char *key, const char *expected, bool positive,
+                       double *io_value, struct error *out_error)
+{
+    for (size_t i = 0; i < frf->key_count; i++) {
+        const char *value = frf->keys[i].value;
+        if (strcmp(frf->keys[i].key, key) == 0 &&
+            (number_parse(value, strlen(value), io_value) != number_ok || (positive && !(*io_value > 0.0)))) {
+            return error_set(out_error, error_refused, "%s: %s: '%.60s', expected %s", path, key, value, expected);
+        }
+    }
+    return 0;
+}
+
 /// The rate the controller is to run at.
 static int find_rate(const char *path, const struct frf *frf, double rate_hz, double *out_rate_hz,
                      struct error *out_error)
 {
     *out_rate_hz = rate_hz;
-    for (size_t i = 0; i < frf->key_count && !(*out_rate_hz > 0.0); i++) {
-        const char *value = frf->keys[i].value;
-        if (strcmp(frf->keys[i].key, "sample_rate_hz") == 0 &&
-            (number_parse(value, strlen(value), out_rate_hz) != number_ok || !(*out_rate_hz > 0.0))) {
-            return error_set(out_error, error_refused, "%s: sample_rate_hz: '%.60s', expected a number above 0", path,
-                             value);
-        }
+    if (!(rate_hz > 0.0) &&
+        find_number(path, frf, "sample_rate_hz", "a number above 0", true, out_rate_hz, out_error)) {
+        return error_refused;
     }
     if (*out_rate_hz > 0.0) {
         return 0;
@@ -101,8 +111,11 @@ static void take_lines(const struct frf *frf, struct tune_plant *io_plant)
 int tune_plant_take(const char *path, const struct frf *frf, double rate_hz, double loop_delay_s,
                     struct tune_plant *out_plant, struct error *out_error)
 {
-    *out_plant = (struct tune_plant){.loop_delay_s = loop_delay_s};
-    int status = find_units(path, frf, out_plant, out_error);
+    double removed_s = 0.0;
+    *out_plant = (struct tune_plant){0};
+    int status = find_number(path, frf, "delay_removed_s", "a number of seconds", false, &removed_s, out_error);
+    out_plant->loop_delay_s = loop_delay_s + removed_s;
+    status = status ? status : find_units(path, frf, out_plant, out_error);
     status = status ? status : find_rate(path, frf, rate_hz, &out_plant->rate_hz, out_error);
     if (!status && !allocate(out_plant, frf->count)) {
         status = error_set(out_error, error_refused, "%s: memory is short", path);

@@ -31,7 +31,8 @@ struct tune_plant {
 };
 
 /// Takes the valid lines of a response. The rate is `rate_hz`, or if that is 0 the key sample_rate_hz of the file.
-/// `loop_delay_s` is delay of the loop that is not in the response (a bus, a computing sample).
+/// `loop_delay_s` is delay of the loop that is not in the response (a bus, a computing sample); what `frf --delay` took
+/// out (key delay_removed_s) is put back, because the loop has it.
 /// Errors: error_usage without a rate; error_refused if input and output are not torque, force, current or voltage to
 ///         velocity or position, or fewer than 8 lines can be used. *out_plant is empty then. `path` begins messages.
 /// Test:   tests/unit/test_tune_plant.c

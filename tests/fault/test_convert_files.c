@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/// Files of every format that convert knows, cut off after every byte, and with bits turned over all along them: refused
-/// with one line or read, never a crash (the sanitizers watch); a full disk or a device leaves nothing half written.
+/// Files of every format that convert knows, cut off after every byte, and with bits turned over all along them:
+/// refused with one line or read, never a crash (the sanitizers watch); a full disk or a device leaves nothing half
+/// written.
 #define _XOPEN_SOURCE 700 /* SIGXFSZ */
 #include "lab/record/format.h"
 #include "lab/record/mat_file.h"

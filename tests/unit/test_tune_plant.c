@@ -63,6 +63,19 @@ static void test_tune_plant_adds_the_loops_delay(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, cabs(plant.response[24] - measured * -I));
 }
 
+static void test_tune_plant_puts_a_removed_delay_back(void)
+{
+    TEST_ASSERT_TRUE(frf_set_text(&frf.keys[0].key, "delay_removed_s"));
+    TEST_ASSERT_TRUE(frf_set_text(&frf.keys[0].value, "0.00075"));
+    TEST_ASSERT_EQUAL_INT(0, tune_plant_take("f.csv", &frf, 2000.0, 0.00025, &plant, &error));
+    const double complex shown = frf.real[25] + frf.imag[25] * I;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, cabs(plant.response[24] - shown * -I));
+    tune_plant_free(&plant);
+    TEST_ASSERT_TRUE(frf_set_text(&frf.keys[0].value, "late"));
+    TEST_ASSERT_EQUAL_INT(error_refused, tune_plant_take("f.csv", &frf, 2000.0, 0.0, &plant, &error));
+    TEST_ASSERT_NOT_NULL(strstr(error.message, "delay_removed_s: 'late'"));
+}
+
 static void test_tune_plant_rate_of_the_option_goes_before_the_file(void)
 {
     TEST_ASSERT_EQUAL_INT(0, tune_plant_take("f.csv", &frf, 4000.0, 0.0, &plant, &error));
@@ -138,6 +151,7 @@ int main(void)
     RUN_TEST(test_tune_plant_leaves_out_lines_that_cannot_be_used);
     RUN_TEST(test_tune_plant_takes_standard_deviations_and_their_confidence);
     RUN_TEST(test_tune_plant_adds_the_loops_delay);
+    RUN_TEST(test_tune_plant_puts_a_removed_delay_back);
     RUN_TEST(test_tune_plant_rate_of_the_option_goes_before_the_file);
     RUN_TEST(test_tune_plant_names_units);
     RUN_TEST(test_tune_plant_refuses_other_quantities);

@@ -101,37 +101,57 @@ struct head {
     uint64_t values;
 };
 
-/* Flags, sizes and name; *io_at ends behind them. */
-static int read_head(const struct walker *self, uint64_t *io_at, uint64_t end, struct head *out_head)
+static int read_flags(const struct walker *self, uint64_t *io_at, uint64_t end, struct head *out_head)
 {
-    struct element flags, sizes, name;
-    unsigned char bytes[4 * rank_max];
+    struct element flags;
+    unsigned char bytes[4];
     int status = read_element(self, *io_at, end, &flags);
-    if (!status && (flags.type != type_uint32 || flags.length != 8 || !read_at(self, flags.data, bytes, 4)))
-        status = refuse(self, *io_at, "the flags of a variable were expected");
     if (status)
         return status;
+    if (flags.type != type_uint32 || flags.length != 8 || !read_at(self, flags.data, bytes, sizeof bytes))
+        return refuse(self, *io_at, "the flags of a variable were expected");
     uint32_t word = load_u32(bytes, self->swapped);
     *out_head = (struct head){.class_type = word & 0xff, .complex = (word & flag_complex) != 0, .values = 1};
     *io_at = flags.next;
-    if (out_head->class_type == class_opaque)
-        return error_none;
-    status = read_element(self, flags.next, end, &sizes);
-    if (!status && (sizes.type != type_int32 || sizes.length < 8 || sizes.length % 4 != 0 ||
-                    sizes.length > sizeof bytes || !read_at(self, sizes.data, bytes, sizes.length)))
-        status = refuse(self, flags.next, "the sizes of a variable were expected");
-    for (size_t d = 0; !status && d < sizes.length / 4; d++) {
+    return error_none;
+}
+
+static int read_sizes(const struct walker *self, uint64_t *io_at, uint64_t end, struct head *io_head)
+{
+    struct element sizes;
+    unsigned char bytes[4 * rank_max];
+    int status = read_element(self, *io_at, end, &sizes);
+    if (status)
+        return status;
+    if (sizes.type != type_int32 || sizes.length < 8 || sizes.length % 4 != 0 || sizes.length > sizeof bytes ||
+        !read_at(self, sizes.data, bytes, sizes.length))
+        return refuse(self, *io_at, "the sizes of a variable were expected");
+    for (size_t d = 0; d < sizes.length / 4; d++) {
         uint32_t size = load_u32(bytes + 4 * d, self->swapped);
-        if (size > INT32_MAX || (size > 0 && out_head->values > UINT32_MAX / size))
-            status = refuse(self, sizes.data, "the sizes of a variable exceed what a file can hold");
-        out_head->values *= size;
+        if (size > INT32_MAX || (size > 0 && io_head->values > UINT32_MAX / size))
+            return refuse(self, sizes.data, "the sizes of a variable exceed what a file can hold");
+        io_head->values *= size;
     }
+    *io_at = sizes.next;
+    return error_none;
+}
+
+/* Flags, sizes and name; *io_at ends behind them. */
+static int read_head(const struct walker *self, uint64_t *io_at, uint64_t end, struct head *out_head)
+{
+    struct element name;
+    int status = read_flags(self, io_at, end, out_head);
+    if (status || out_head->class_type == class_opaque)
+        return status;
+    status = read_sizes(self, io_at, end, out_head);
     if (!status)
-        status = read_element(self, sizes.next, end, &name);
-    if (!status && name.type != type_int8)
-        status = refuse(self, sizes.next, "the name of a variable was expected");
-    *io_at = status ? *io_at : name.next;
-    return status;
+        status = read_element(self, *io_at, end, &name);
+    if (status)
+        return status;
+    if (name.type != type_int8)
+        return refuse(self, *io_at, "the name of a variable was expected");
+    *io_at = name.next;
+    return error_none;
 }
 
 /* One run of numbers: `values` of them, or at least as many bytes where `text`. */
@@ -172,16 +192,24 @@ static int check_inner(const struct walker *self, uint64_t *io_at, uint64_t end,
     return status;
 }
 
+/* Elements whose content is not judged. */
+static int step_over(const struct walker *self, uint64_t *io_at, uint64_t end, int count)
+{
+    int status = error_none;
+    for (int i = 0; i < count && !status; i++) {
+        struct element skipped;
+        status = read_element(self, *io_at, end, &skipped);
+        *io_at = status ? *io_at : skipped.next;
+    }
+    return status;
+}
+
 /* The length of field names, the names, then the fields. */
 static int check_struct(const struct walker *self, uint64_t *io_at, uint64_t end, const struct head *head, int depth)
 {
-    struct element skipped, length, names;
+    struct element length, names;
     unsigned char bytes[4];
-    int status = head->class_type == class_object ? read_element(self, *io_at, end, &skipped) : error_none;
-    if (!status && head->class_type == class_object)
-        *io_at = skipped.next;
-    if (!status)
-        status = read_element(self, *io_at, end, &length);
+    int status = read_element(self, *io_at, end, &length);
     if (!status && (length.type != type_int32 || length.length != 4 || !read_at(self, length.data, bytes, 4)))
         status = refuse(self, *io_at, "the length of field names was expected");
     if (!status)
@@ -197,10 +225,18 @@ static int check_struct(const struct walker *self, uint64_t *io_at, uint64_t end
     return check_inner(self, io_at, end, head->values * (names.length / each), depth);
 }
 
+static int check_values(const struct walker *self, uint64_t at, uint64_t end, const struct head *head)
+{
+    if (head->class_type < class_double || head->class_type > class_uint64)
+        return refuse(self, at, "a variable of a known class was expected");
+    int status = check_numbers(self, &at, end, head->values, false);
+    return status || !head->complex ? status : check_numbers(self, &at, end, head->values, false);
+}
+
 static int check_matrix(const struct walker *self, const struct element *matrix, int depth)
 {
     uint64_t at = matrix->data, end = matrix->data + matrix->length;
-    struct head head;
+    struct head head = {0};
     if (depth > depth_max)
         return refuse(self, at, "variables in variables more than 16 deep");
     int status = read_head(self, &at, end, &head);
@@ -209,30 +245,21 @@ static int check_matrix(const struct walker *self, const struct element *matrix,
     switch (head.class_type) {
     case class_cell:
         return check_inner(self, &at, end, head.values, depth);
+    case class_object: // the name of its class comes first
+        status = step_over(self, &at, end, 1);
+        return status ? status : check_struct(self, &at, end, &head, depth);
     case class_struct:
-    case class_object:
         return check_struct(self, &at, end, &head, depth);
     case class_char:
         return head.values == 0 ? error_none : check_numbers(self, &at, end, head.values, true);
     case class_sparse: // row and column indices of its values, and these
-        for (int i = 0; !status && i < (head.complex ? 4 : 3); i++) {
-            struct element part;
-            status = read_element(self, at, end, &part);
-            at = status ? at : part.next;
-        }
-        return status;
+        return step_over(self, &at, end, head.complex ? 4 : 3);
     case class_function:
     case class_opaque: // matio steps over what is in them
         return error_none;
     default:
-        break;
+        return check_values(self, at, end, &head);
     }
-    if (head.class_type < class_double || head.class_type > class_uint64)
-        return refuse(self, matrix->data, "a variable of a known class was expected");
-    status = check_numbers(self, &at, end, head.values, false);
-    if (!status && head.complex)
-        status = check_numbers(self, &at, end, head.values, false);
-    return status;
 }
 
 /* A compressed variable has a check sum at its end. */

@@ -30,10 +30,10 @@ static matvar_t *numbers(struct output *self, const char *name, const double *da
     return self->library->var_create(name, MAT_C_DOUBLE, MAT_T_DOUBLE, 2, dims, (void *)data, MAT_F_DONT_COPY_DATA);
 }
 
-static matvar_t *number(struct output *self, double value)
+static matvar_t *number(struct output *self, const double *value)
 {
     size_t dims[2] = {1, 1};
-    return self->library->var_create(NULL, MAT_C_DOUBLE, MAT_T_DOUBLE, 2, dims, &value, 0);
+    return self->library->var_create(NULL, MAT_C_DOUBLE, MAT_T_DOUBLE, 2, dims, (void *)value, 0);
 }
 
 /* The next character of UTF-8; a byte that begins none stands for itself. */
@@ -147,7 +147,7 @@ static int set_keys(struct output *self, matvar_t *structure, const struct recor
         double number_value;
         enum mat_key kind = mat_key_kind(record->kind, keys.items[k].key);
         if (kind == mat_key_number && is_canonical(value, &number_value))
-            set_field(self, structure, keys.items[k].key, number(self, number_value));
+            set_field(self, structure, keys.items[k].key, number(self, &number_value));
         else if (kind == mat_key_list)
             set_field(self, structure, keys.items[k].key, bins(self, &record->run));
         else if (kind == mat_key_text || kind == mat_key_number)
@@ -253,39 +253,51 @@ static bool same_fields(const struct mat_library *library, matvar_t *a, matvar_t
     return same;
 }
 
+static bool same_cells(const struct mat_library *library, const matvar_t *a, const matvar_t *b, size_t count)
+{
+    bool same = true;
+    for (size_t i = 0; same && i < count; i++)
+        same = same_data(library, ((matvar_t **)a->data)[i], ((matvar_t **)b->data)[i]);
+    return same;
+}
+
+static bool same_text(const matvar_t *a, const matvar_t *b)
+{
+    char *first = mat_text(a), *second = mat_text(b);
+    bool same = first && second && strcmp(first, second) == 0;
+    free(first);
+    free(second);
+    return same;
+}
+
+static bool same_numbers(const matvar_t *a, const matvar_t *b, size_t count)
+{
+    size_t size = count * (size_t)a->data_size;
+    if (a->data_size != b->data_size)
+        return false;
+    if (!a->isComplex)
+        return memcmp(a->data, b->data, size) == 0;
+    const struct mat_complex_split_t *first = a->data, *second = b->data;
+    return memcmp(first->Re, second->Re, size) == 0 && memcmp(first->Im, second->Im, size) == 0;
+}
+
 /* Whether what was read back is what was to be written, bit for bit. */
 static bool same_data(const struct mat_library *library, matvar_t *a, matvar_t *b)
 {
-    if (!a || !b || a->class_type != b->class_type || mat_value_count(a) != mat_value_count(b) ||
-        a->isComplex != b->isComplex)
+    if (!a || !b || a->class_type != b->class_type || a->isComplex != b->isComplex)
         return false;
     size_t count = mat_value_count(a);
+    if (count != mat_value_count(b))
+        return false;
     if (count == 0)
         return true;
     if (a->class_type == MAT_C_STRUCT)
         return same_fields(library, a, b);
     if (!a->data || !b->data)
         return false;
-    if (a->class_type == MAT_C_CELL) {
-        bool same = true;
-        for (size_t i = 0; same && i < count; i++)
-            same = same_data(library, ((matvar_t **)a->data)[i], ((matvar_t **)b->data)[i]);
-        return same;
-    }
-    if (a->class_type == MAT_C_CHAR) {
-        char *first = mat_text(a), *second = mat_text(b);
-        bool same = first && second && strcmp(first, second) == 0;
-        free(first);
-        free(second);
-        return same;
-    }
-    if (a->data_size != b->data_size)
-        return false;
-    size_t size = count * (size_t)a->data_size;
-    if (!a->isComplex)
-        return memcmp(a->data, b->data, size) == 0;
-    const struct mat_complex_split_t *first = a->data, *second = b->data;
-    return memcmp(first->Re, second->Re, size) == 0 && memcmp(first->Im, second->Im, size) == 0;
+    if (a->class_type == MAT_C_CELL)
+        return same_cells(library, a, b, count);
+    return a->class_type == MAT_C_CHAR ? same_text(a, b) : same_numbers(a, b, count);
 }
 
 /* The name of the first variable that cannot be read back; NULL if the file is as it should be. matio does not say when
