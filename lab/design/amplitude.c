@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/design/amplitude.h"
 
+#include "lab/design/lines.h"
 #include "lab/design/optimal_power.h"
 #include "lab/record/model_file.h"
 #include "lab/record/number.h"
@@ -170,7 +171,7 @@ static int take_numbers(const struct row_reader *self, double frequency_hz, doub
 {
     const double bins = frequency_hz / line_hz(self->request);
     const size_t line = nearest_line(self->request, bins);
-    if (!(fabs(self->request->bins[line] - bins) <= fmin(0.01, 1e-6 * bins))) { // as lines.c has it
+    if (!(fabs(self->request->bins[line] - bins) <= design_lines_tolerance(bins))) {
         return error_set(self->out_error, error_refused,
                          "%s:%zu: %.9g Hz is not an excited line, the nearest is %.9g Hz", self->path, self->number,
                          frequency_hz, self->request->bins[line] * line_hz(self->request));

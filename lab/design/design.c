@@ -83,6 +83,17 @@ static int check_lines(const struct design_request *request, struct error *out_e
     return 0;
 }
 
+static int check_shape(const struct design_request *request, struct error *out_error)
+{
+    for (size_t k = 0; request->torque_shape && k < request->bin_count; k++) {
+        if (!(request->torque_shape[k] > 0 && isfinite(request->torque_shape[k]))) {
+            return error_set(out_error, error_usage, "line %zu: torque %g in the shape, expected a positive number",
+                             k + 1, request->torque_shape[k]);
+        }
+    }
+    return 0;
+}
+
 static const struct design_method *find_method(const char *name)
 {
     for (size_t i = 0; design_methods[i]; i++) {
@@ -270,7 +281,6 @@ static void take_amplitudes(const struct design_search *search, double tolerance
 static int run_method(const struct design_request *request, const struct design_method *method,
                       struct design_search *search, struct design_result *result, struct error *out_error)
 {
-    const volatile sig_atomic_t *stop = request->stop_requested;
     struct design_watch watch;
     design_watch_begin(request, request->inertia_kgm2 * design_spectrum_rms(search->spectrum, design_acceleration),
                        &watch);
@@ -279,9 +289,22 @@ static int run_method(const struct design_request *request, const struct design_
     int status = method->run(request, search, out_error);
     result->cpu_s = cpu_seconds() - begun_s + watch.cpu_s;
     result->starts = watch.starts;
-    result->interrupted = stop && *stop;
+    result->interrupted = atomic_load(&watch.interrupted);
     search->watch = NULL;
     return status;
+}
+
+/// Squares of limits near the ends of what a double holds leave no numbers.
+static int check_result(const struct design_result *result, struct error *out_error)
+{
+    const double effective_torque_Nm = result->effective_torque_Nm;
+    if (!(effective_torque_Nm > 0 && isfinite(effective_torque_Nm))) {
+        return error_set(out_error, error_refused,
+                         "the effective torque comes out as %g, expected a positive number: a limit or the inertia is "
+                         "too large or too small to calculate with",
+                         fabs(effective_torque_Nm));
+    }
+    return 0;
 }
 
 static int optimise(const struct design_request *request, const struct design_method *method,
@@ -303,8 +326,9 @@ static int optimise(const struct design_request *request, const struct design_me
         fine_scan_run(&scan, search.best);
         fill_result(request, spectrum, &search, &scan, result);
         fine_scan_free(&scan);
-        status = design_start_apply(request, result, out_error);
+        status = check_result(result, out_error);
     }
+    status = status ? status : design_start_apply(request, result, out_error);
     design_search_free(&search);
     return status;
 }
@@ -313,6 +337,7 @@ int design_run(const struct design_request *request, struct design_result *out_r
 {
     *out_result = (struct design_result){0};
     int status = check_lines(request, out_error);
+    status = status ? status : check_shape(request, out_error);
     status = status ? status : check_limits(request, out_error);
     status = status ? status : check_search(request, out_error);
     const struct design_method *method = find_method(request->method);

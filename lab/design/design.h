@@ -131,8 +131,9 @@ extern const struct design_method *const design_methods[];
 
 /// Chooses the phases and fills in one period of every signal.
 /// Errors: error_usage with value and expectation for a request that makes no sense (no lines, lines at or above half
-/// the rate or not ascending, no limit, a limit or inertia that is not a positive number, unknown method);
-/// error_refused if memory is short. *out_result is empty then.
+/// the rate or not ascending, no limit, a limit, inertia or torque of the shape that is not a positive number, unknown
+/// method); error_refused if memory is short, for numbers so large or small that no finite design comes out, and what
+/// design_start_apply() refuses (start.h). *out_result is empty then.
 int design_run(const struct design_request *request, struct design_result *out_result, struct error *out_error);
 
 void design_result_free(struct design_result *result);

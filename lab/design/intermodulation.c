@@ -202,13 +202,14 @@ static bool find_free_bins(const bool *excited, const uint32_t *bins, struct des
 
 bool design_intermodulation_count(size_t line_count, const uint32_t *bins, struct design_intermodulation *out_counts)
 {
-    *out_counts = (struct design_intermodulation){.line_count = line_count};
+    *out_counts = (struct design_intermodulation){0};
     struct sums sums;
     bool *excited = calloc((size_t)bins[line_count - 1] + 1, sizeof *excited);
     if (!excited || !sums_create(line_count, bins, &sums)) {
         free(excited);
         return false;
     }
+    out_counts->line_count = line_count;
     for (size_t k = 0; k < line_count; k++) {
         excited[bins[k]] = true;
     }

@@ -40,7 +40,7 @@ static uint32_t highest_bin(const struct parse *self)
     return (uint32_t)((self->grid->period_samples - 1) / 2);
 }
 
-static double tolerance_of(double bins)
+double design_lines_tolerance(double bins)
 {
     return fmin(0.01, 1e-6 * bins);
 }
@@ -61,7 +61,7 @@ static int to_bin(const struct parse *self, const char *what, double frequency_h
                          "%s: %s %.9g Hz is too high, half the rate is %.9g Hz and the highest line %.9g Hz",
                          self->place, what, frequency_hz, self->grid->rate_hz / 2, highest_bin(self) * line_hz(self));
     }
-    if (!(bins > 0.5) || fabs(bins - round(bins)) > tolerance_of(bins)) {
+    if (!(bins > 0.5) || fabs(bins - round(bins)) > design_lines_tolerance(bins)) {
         return refuse_off_grid(self, what, frequency_hz);
     }
     *out_bin = (uint32_t)round(bins);
@@ -72,7 +72,7 @@ static int to_bin(const struct parse *self, const char *what, double frequency_h
 static int last_bin(const struct parse *self, uint32_t *out_bin)
 {
     double bins = self->last_hz / line_hz(self);
-    double last = floor(bins + tolerance_of(bins));
+    double last = floor(bins + design_lines_tolerance(bins));
     if (!(last <= highest_bin(self))) {
         return to_bin(self, "FMAX", self->last_hz, out_bin);
     }
@@ -115,7 +115,7 @@ static int parse_odd(const struct parse *self)
     status = status ? status : to_bin(self, "STEP", self->third, &step);
     double first = self->first_hz / line_hz(self);
     for (uint32_t bin = step; !status && bin <= last; bin += 2 * step) {
-        if (bin >= first - tolerance_of(first)) {
+        if (bin >= first - design_lines_tolerance(first)) {
             append(self, bin);
         }
     }

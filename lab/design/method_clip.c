@@ -8,14 +8,8 @@
 
 #include <stdlib.h>
 
-static double score_all(struct design_search *search, const double *c)
-{
-    design_waveform_synthesise(&search->waveform, c, search->packed);
-    return design_waveform_peak_all(&search->waveform, search->packed);
-}
-
-static int clip(const struct design_request *request, struct design_search *search,
-                const struct design_waveform *acceleration, double *packed, double *c)
+static void clip(const struct design_request *request, struct design_search *search,
+                 const struct design_waveform *acceleration, double *packed, double *c)
 {
     const size_t iterations = design_method_iterations(request, &design_method_clip);
     const size_t lines = search->spectrum->line_count;
@@ -24,11 +18,10 @@ static int clip(const struct design_request *request, struct design_search *sear
     for (size_t i = 0; i <= iterations && (i == 0 || design_search_goes_on(search)); i++) {
         design_waveform_synthesise(acceleration, c, packed);
         double peak = design_waveform_peak(acceleration, packed, 0);
-        design_search_offer(search, c, request->keep == design_keep_all ? score_all(search, c) : peak);
+        design_search_offer(search, c, request->keep == design_keep_all ? design_search_peak(search, c) : peak);
         double level = design_clipping_factor(i, iterations) * peak;
         design_clipping_step(acceleration, 0, level, packed, &c[2 * lines], c);
     }
-    return 0;
 }
 
 static int run(const struct design_request *request, struct design_search *search, struct error *out_error)
@@ -39,11 +32,14 @@ static int run(const struct design_request *request, struct design_search *searc
     }
     double *packed = calloc(acceleration.packed_length, sizeof *packed);
     double *c = calloc(4 * search->spectrum->line_count, sizeof *c);
-    int status = packed && c ? clip(request, search, &acceleration, packed, c) : design_method_out_of_memory(out_error);
+    const bool memory = packed && c;
+    if (memory) {
+        clip(request, search, &acceleration, packed, c);
+    }
     free(packed);
     free(c);
     design_waveform_free(&acceleration);
-    return status;
+    return memory ? 0 : design_method_out_of_memory(out_error);
 }
 
 const struct design_method design_method_clip = {

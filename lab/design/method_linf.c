@@ -5,6 +5,7 @@
 /// that holds matrices of points x lines.
 #include "lab/design/method.h"
 #include "lab/design/phases.h"
+#include "lab/numeric/blas.h"
 #include "lab/numeric/trust_region.h"
 
 #include <cblas.h>
@@ -24,10 +25,6 @@ static const double matrices_max_bytes = 2e9;
 
 /// A row of J smaller than this in units of the largest adds less than rounding to J'J.
 static const double negligible = 1e-10;
-
-/// Present if the BLAS in use is OpenBLAS: one thread, so that sums, and with them the phases, come out the same on
-/// every machine.
-extern void openblas_set_num_threads(int threads) __attribute__((weak));
 
 struct linf {
     const struct design_request *request;
@@ -54,8 +51,7 @@ static void set_directions(struct linf *self, const double *x)
 static double synthesise(struct linf *self, const double *x)
 {
     set_directions(self, x);
-    design_waveform_synthesise(&self->search->waveform, self->c, self->search->packed);
-    return design_waveform_peak_all(&self->search->waveform, self->search->packed);
+    return design_search_peak(self->search, self->c);
 }
 
 static double cost(void *context, const double *x)
@@ -210,9 +206,7 @@ static int run(const struct design_request *request, struct design_search *searc
     if (status) {
         return status;
     }
-    if (openblas_set_num_threads) {
-        openblas_set_num_threads(1);
-    }
+    blas_use_one_thread();
     const size_t matrix = self.points * self.lines;
     double *work = calloc(2 * matrix + block_rows * (self.lines + 1) + 5 * self.lines, sizeof *work);
     if (!work) {

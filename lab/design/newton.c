@@ -3,6 +3,7 @@
 
 #include "lab/design/norm.h"
 #include "lab/numeric/cholesky.h"
+#include "lab/numeric/vector.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -28,15 +29,6 @@ struct newton {
     double *memory;
 };
 
-static double dot(size_t count, const double *a, const double *b)
-{
-    double sum = 0;
-    for (size_t i = 0; i < count; i++) {
-        sum += a[i] * b[i];
-    }
-    return sum;
-}
-
 static double mean_diagonal(const struct newton *self)
 {
     double sum = 0;
@@ -61,8 +53,8 @@ static bool solve(struct newton *self, double unit)
 /// What the quadratic model expects of the step: -g's - s'Hs / 2, with H s = -g - damping unit s.
 static double expected_decrease(const struct newton *self, double unit)
 {
-    return -dot(self->variables, self->gradient, self->step) / 2 +
-           self->damping * unit * dot(self->variables, self->step, self->step) / 2;
+    return -vector_dot(self->variables, self->gradient, self->step) / 2 +
+           self->damping * unit * vector_dot(self->variables, self->step, self->step) / 2;
 }
 
 static void swap(double **a, double **b)
@@ -147,8 +139,7 @@ bool design_newton_run(struct design_search *search, const struct design_newton_
         return false;
     }
     design_norm_get_variables(&self.norm, inout_c, self.x);
-    for (unsigned exponent = plan->first_exponent; exponent <= plan->last_exponent && !self.stopped;
-         exponent += plan->step) {
+    for (unsigned exponent = plan->first_exponent; exponent <= plan->last_exponent && !self.stopped; exponent++) {
         self.norm.exponent = exponent;
         minimise(&self, plan->steps);
     }

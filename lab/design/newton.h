@@ -8,11 +8,10 @@
 struct design_newton_plan {
     unsigned first_exponent; ///< p = 2^exponent, from here
     unsigned last_exponent;  ///< to here, one by one
-    unsigned step;           ///< exponents per step, >= 1
     size_t steps;            ///< at most so many for each p
 };
 
-/// Minimises log ||u||_p for each p in turn with the exact second derivatives (design_norm.h), damped until they are
+/// Minimises log ||u||_p for each p in turn with the exact second derivatives (norm.h), damped until they are
 /// positive definite and the value falls; offers every point to the search.
 /// Shapes: inout_c: 2 line_count doubles; on return the minimum for the last p
 /// Cost:   variables^3 / 3 per step, memory 2 variables^2

@@ -111,8 +111,7 @@ double design_norm_evaluate(struct design_norm *self, const double *x, double *o
 {
     struct design_search *search = self->search;
     design_norm_get_directions(self, x, self->c);
-    design_waveform_synthesise(&search->waveform, self->c, search->packed);
-    self->peak = design_waveform_peak_all(&search->waveform, search->packed);
+    self->peak = design_search_peak(search, self->c);
     const double power_root = design_search_power_root(search, self->c);
     design_search_offer(search, self->c, self->peak / power_root);
     self->sum = raise_signals(self);

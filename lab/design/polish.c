@@ -2,6 +2,7 @@
 #include "lab/design/polish.h"
 
 #include "lab/design/norm.h"
+#include "lab/numeric/vector.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -34,15 +35,6 @@ struct polish {
     double *memory;
 };
 
-static double dot(size_t count, const double *a, const double *b)
-{
-    double sum = 0;
-    for (size_t i = 0; i < count; i++) {
-        sum += a[i] * b[i];
-    }
-    return sum;
-}
-
 /// direction = -H gradient by the two-loop recursion (Nocedal 1980).
 static void find_direction(struct polish *self)
 {
@@ -53,23 +45,23 @@ static void find_direction(struct polish *self)
     }
     for (size_t i = 0; i < self->held; i++) {
         size_t at = (self->newest + pair_count - i) % pair_count;
-        weight[at] = self->inverse_of[at] * dot(count, self->step_of[at], self->direction);
+        weight[at] = self->inverse_of[at] * vector_dot(count, self->step_of[at], self->direction);
         for (size_t k = 0; k < count; k++) {
             self->direction[k] -= weight[at] * self->change_of[at][k];
         }
     }
     // Without curvature yet: a first step of a tenth of a radian in all, which keeps the picture.
-    double scale = 0.1 / (sqrt(dot(count, self->gradient, self->gradient)) + 1e-300);
+    double scale = 0.1 / (sqrt(vector_dot(count, self->gradient, self->gradient)) + 1e-300);
     if (self->held > 0) {
         const double *change = self->change_of[self->newest];
-        scale = 1 / (self->inverse_of[self->newest] * dot(count, change, change));
+        scale = 1 / (self->inverse_of[self->newest] * vector_dot(count, change, change));
     }
     for (size_t k = 0; k < count; k++) {
         self->direction[k] *= scale;
     }
     for (size_t i = self->held; i-- > 0;) {
         size_t at = (self->newest + pair_count - i) % pair_count;
-        double back = self->inverse_of[at] * dot(count, self->change_of[at], self->direction);
+        double back = self->inverse_of[at] * vector_dot(count, self->change_of[at], self->direction);
         for (size_t k = 0; k < count; k++) {
             self->direction[k] += (weight[at] - back) * self->step_of[at][k];
         }
@@ -80,7 +72,7 @@ static void find_direction(struct polish *self)
 /// On success trial_x and trial_gradient hold the new point; *inout_value its value.
 static bool search_line(struct polish *self, double *inout_value)
 {
-    const double slope = dot(self->variables, self->gradient, self->direction);
+    const double slope = vector_dot(self->variables, self->gradient, self->direction);
     double low = 0;
     double high = INFINITY;
     double step = 1;
@@ -98,7 +90,7 @@ static bool search_line(struct polish *self, double *inout_value)
         double value = design_norm_evaluate(&self->norm, self->trial_x, self->trial_gradient);
         if (!(value <= *inout_value + armijo * step * slope)) {
             high = step;
-        } else if (dot(self->variables, self->trial_gradient, self->direction) < curvature * slope) {
+        } else if (vector_dot(self->variables, self->trial_gradient, self->direction) < curvature * slope) {
             low = step;
         } else {
             *inout_value = value;
@@ -116,7 +108,7 @@ static void remember_step(struct polish *self)
         self->step_of[at][k] = self->trial_x[k] - self->x[k];
         self->change_of[at][k] = self->trial_gradient[k] - self->gradient[k];
     }
-    double product = dot(self->variables, self->step_of[at], self->change_of[at]);
+    double product = vector_dot(self->variables, self->step_of[at], self->change_of[at]);
     if (product > 0) { // the line search's curvature condition gives this, but for rounding
         self->inverse_of[at] = 1 / product;
         self->newest = at;
@@ -176,8 +168,7 @@ bool design_polish_run(struct design_search *search, const struct design_polish_
         return false;
     }
     design_norm_get_variables(&self.norm, inout_c, self.x);
-    for (unsigned exponent = plan->first_exponent; exponent <= plan->last_exponent && !self.stopped;
-         exponent += plan->step) {
+    for (unsigned exponent = plan->first_exponent; exponent <= plan->last_exponent && !self.stopped; exponent++) {
         self.norm.exponent = exponent;
         minimise(&self, plan->iterations);
     }

@@ -7,16 +7,14 @@
 
 struct design_polish_plan {
     unsigned first_exponent; ///< p = 2^exponent, from here
-    unsigned last_exponent;  ///< to here
-    unsigned step;           ///< exponents per step, >= 1
+    unsigned last_exponent;  ///< to here, one by one
     size_t iterations;       ///< of L-BFGS for each p
 };
 
-/// Minimises log ||u||_p over the phases by L-BFGS (20 pairs, weak Wolfe line search) for each p in turn, and offers
+/// Minimises log ||u||_p (norm.h) by L-BFGS (20 pairs, weak Wolfe line search) for each p in turn, and offers
 /// every point that is evaluated to the search.
-/// Equation:  r = u / max|u|,  S = sum r^p,  d log||u||_p / d phi_k = -1 / (S max|u|) Im(c_k conj(y_k)),  y = G'
-/// r^(p-1) Shapes:    inout_c: 2 line_count doubles; on return the minimum for the last p. Returns false if memory is
-/// short.
+/// Shapes: inout_c: 2 line_count doubles; on return the minimum for the last p
+/// Returns false if memory is short.
 bool design_polish_run(struct design_search *search, const struct design_polish_plan *plan, double *inout_c);
 
 #endif

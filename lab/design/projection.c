@@ -26,19 +26,15 @@ static double clipped(double value, double level)
     return value < -level ? -level : value;
 }
 
-/// Signals of c into search->packed; returns the peak at unit power.
-static double evaluate(struct projection *self)
+/// Tries c, and keeps it if it is the best of this call.
+static void evaluate(struct projection *self)
 {
     struct design_search *search = self->search;
-    design_waveform_synthesise(&search->waveform, self->c, search->packed);
-    double score = design_waveform_peak_all(&search->waveform, search->packed);
-    score /= design_search_power_root(search, self->c);
-    design_search_offer(search, self->c, score);
+    const double score = design_search_try(search, self->c);
     if (score < self->best_score) {
         self->best_score = score;
         memcpy(self->best, self->c, 2 * search->spectrum->line_count * sizeof(double));
     }
-    return score;
 }
 
 /// Lengths of the fit within the tolerance. Where the limits take away power, all lengths shrink alike: the common

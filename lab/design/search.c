@@ -5,15 +5,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { points_per_highest_line = 40 };
+enum { search_points = 40 }; ///< per highest line
 
 size_t design_search_grid(const struct design_request *request, const struct design_spectrum *spectrum,
-                          size_t points_per_line)
+                          size_t points_per_highest_line)
 {
     if (request->grid == design_grid_samples) {
         return request->period_samples;
     }
-    return design_waveform_smooth_length(points_per_line * (size_t)spectrum->bins[spectrum->line_count - 1]);
+    return design_waveform_smooth_length(points_per_highest_line * (size_t)spectrum->bins[spectrum->line_count - 1]);
 }
 
 /// Shares of the power, which |c_k|^2 multiplies.
@@ -53,8 +53,8 @@ bool design_search_create(const struct design_request *request, const struct des
 {
     struct design_request prescribed = *request;
     prescribed.amplitude_tolerance_db = 0;
-    return design_search_create_on(&prescribed, spectrum,
-                                   design_search_grid(request, spectrum, points_per_highest_line), 1, out_search);
+    return design_search_create_on(&prescribed, spectrum, design_search_grid(request, spectrum, search_points), 1,
+                                   out_search);
 }
 
 void design_search_free(struct design_search *self)
@@ -68,6 +68,12 @@ void design_search_free(struct design_search *self)
     self->share = NULL;
 }
 
+double design_search_peak(struct design_search *self, const double *c)
+{
+    design_waveform_synthesise(&self->waveform, c, self->packed);
+    return design_waveform_peak_all(&self->waveform, self->packed);
+}
+
 void design_search_offer(struct design_search *self, const double *c, double score)
 {
     if (score < self->best_score) {
@@ -77,6 +83,13 @@ void design_search_offer(struct design_search *self, const double *c, double sco
             design_watch_offer(self->watch, score);
         }
     }
+}
+
+double design_search_try(struct design_search *self, const double *c)
+{
+    const double score = design_search_peak(self, c) / design_search_power_root(self, c);
+    design_search_offer(self, c, score);
+    return score;
 }
 
 void design_search_plan(struct design_search *self, size_t evaluations)

@@ -33,8 +33,14 @@ size_t design_search_grid(const struct design_request *request, const struct des
                           size_t points_per_highest_line);
 void design_search_free(struct design_search *self);
 
+/// Puts the signals at c into self->packed; returns the largest, in units of its limit.
+double design_search_peak(struct design_search *self, const double *c);
+
 /// Makes c the best if its score is smaller than the best so far; the first always is.
 void design_search_offer(struct design_search *self, const double *c, double score);
+
+/// Offers c with its peak at unit power as the score, which is returned; the signals stay in self->packed.
+double design_search_try(struct design_search *self, const double *c);
 
 /// Says how many evaluations are to come, for the progress.
 void design_search_plan(struct design_search *self, size_t evaluations);

@@ -34,8 +34,9 @@ int design_start_apply(const struct design_request *request, struct design_resul
     };
     const enum design_loop_mode mode = request->torque_mode ? design_loop_torque : design_loop_cascade;
     const bool known = request->start == design_start_model;
-    if (known && check_model(request, out_error)) {
-        return error_refused;
+    int status = known ? check_model(request, out_error) : 0;
+    if (status) {
+        return status;
     }
     if (known || request->start == design_start_bank) {
         return design_start_choose(&table, known ? request->start_model : NULL, mode, &io_result->start_index,

@@ -5,7 +5,7 @@
 #include "lab/design/phases.h"
 #include "lab/design/polish.h"
 #include "lab/design/projection.h"
-#include "lab/numeric/cholesky.h"
+#include "lab/numeric/blas.h"
 
 #include "sim/random.h"
 
@@ -33,19 +33,15 @@ static const double finish_share_max = 0.1;
 /// p = 16 .. 256 for every start. The projections leave the largest values where they want them; a p this small moves
 /// them once more to where there is more room, worth as much as twice the projections. The peak at p = 256 ranks starts
 /// as the finished ones will be ranked (correlation 0.98), so only the best go on.
-static const struct design_newton_plan descend_by_newton = {
-    .first_exponent = 4, .last_exponent = 8, .step = 1, .steps = 4};
-static const struct design_polish_plan descend_by_gradient = {.first_exponent = 4, .last_exponent = 11, .step = 1};
+static const struct design_newton_plan descend_by_newton = {.first_exponent = 4, .last_exponent = 8, .steps = 4};
+static const struct design_polish_plan descend_by_gradient = {.first_exponent = 4, .last_exponent = 11};
 
-static const struct design_newton_plan relax_by_newton = {
-    .first_exponent = 3, .last_exponent = 12, .step = 1, .steps = 4};
+static const struct design_newton_plan relax_by_newton = {.first_exponent = 3, .last_exponent = 12, .steps = 4};
 
 /// Up to p = 2^16, where log(points) / p is nothing: 0.0002 above p = 4096.
-static const struct design_newton_plan finish_by_newton = {
-    .first_exponent = 9, .last_exponent = 16, .step = 1, .steps = 4};
-static const struct design_newton_plan finish_again_by_newton = {
-    .first_exponent = 12, .last_exponent = 16, .step = 1, .steps = 4};
-static const struct design_polish_plan finish_by_gradient = {.first_exponent = 10, .last_exponent = 12, .step = 1};
+static const struct design_newton_plan finish_by_newton = {.first_exponent = 9, .last_exponent = 16, .steps = 4};
+static const struct design_newton_plan finish_again_by_newton = {.first_exponent = 12, .last_exponent = 16, .steps = 4};
+static const struct design_polish_plan finish_by_gradient = {.first_exponent = 10, .last_exponent = 12};
 
 struct candidate {
     double score; ///< INFINITY: none
@@ -124,13 +120,6 @@ static bool descend(struct design_search *search, const struct design_starts_pla
                                          : design_polish_run(search, &gradient, inout_c);
 }
 
-static void offer(struct design_search *search, const double *c)
-{
-    design_waveform_synthesise(&search->waveform, c, search->packed);
-    double peak = design_waveform_peak_all(&search->waveform, search->packed);
-    design_search_offer(search, c, peak / design_search_power_root(search, c));
-}
-
 static void disturb(size_t lines, double size_rad, uint64_t seed, double *inout_c)
 {
     uint64_t state[4];
@@ -171,7 +160,7 @@ static bool run_start(struct worker *self, size_t number)
     const size_t lines = self->starts->spectrum->line_count;
     design_phases_newman(lines, self->c);
     if (number == 0) {
-        offer(&self->search, self->c);
+        design_search_try(&self->search, self->c);
     } else {
         disturb(lines, disturbance_rad, seed_of(self->starts->request->seed, number), self->c);
     }
@@ -181,7 +170,7 @@ static bool run_start(struct worker *self, size_t number)
     if (!design_projection_run(&self->coarse, iterations, self->c)) {
         return false;
     }
-    offer(&self->search, self->c);
+    design_search_try(&self->search, self->c);
     if (design_search_goes_on(&self->search) && !descend(&self->search, plan, self->c)) {
         return false;
     }
@@ -244,7 +233,7 @@ static void run_finish(struct worker *self)
         const struct candidate *candidate = &starts->best[place];
         memcpy(self->c, candidate->c, 2 * lines * sizeof(double));
         self->search.best_score = INFINITY;
-        offer(&self->search, self->c);
+        design_search_try(&self->search, self->c);
         bool memory = !design_search_goes_on(&self->search) ||
                       finish(&self->search, starts->plan, seed_of(starts->request->seed, ~candidate->number), self->c);
         note(starts, memory, false);
@@ -356,7 +345,7 @@ bool design_starts_run(const struct design_request *request, const struct design
     }
     double *const memory = self.final.c;
     pthread_mutex_init(&self.mutex, NULL);
-    cholesky_use_one_thread();
+    blas_use_one_thread();
     size_t planned = plan->starts < SIZE_MAX ? plan->starts : 0;
     design_watch_plan(self.watch, planned * plan->evaluations_per_start);
     work_together(&self, plan->starts);

@@ -72,26 +72,24 @@ extern const double measure_dwell_s;
 
 /// Length of a ramp that is gentle for this table, in samples.
 /// Equation:  max(0.05 s, in cascade mode 1.5 max|position| / max|velocity|), at most 10 s: a cascade has to travel
-/// back by
-///            the position it holds, and this ramp adds at most the table's own top speed (msgen/player.h, trap).
+///            back by the position it holds, and this ramp adds at most the table's own top speed (msgen/player.h,
+///            trap).
 ///            A table that travels at V: at least 1.5 |V| / max|acceleration| too, so that setting off asks for no more
 ///            than the table's own top acceleration
 uint32_t measure_ramp_samples(const struct msgen_table *table, enum drive_mode mode);
 
 /// Checks a plan against its table without touching a drive.
 /// Errors: error_usage or error_refused: no periods, channels that the mode needs are missing, more rows than memory
-/// holds,
-///         limits that are none, table samples beyond the torque limit; of a table that travels: torque mode (nothing
-///         would hold the speed), a position limit that all its periods together pass, more periods than its counts
-///         hold
+///         holds, limits that are none, table samples beyond the torque limit; of a table that travels: torque mode
+///         (nothing would hold the speed), a position limit that all its periods together pass, more periods than its
+///         counts hold
 int measure_check(const struct measure_plan *plan, struct error *out_error);
 
 /// Opens the drive (drive->operations->open), measures, stops it. Does not close it.
 /// Bound:  the set-points never step by more than the table does plus 1.5 max|x| / (length of the ramp), the stop
-/// included, but for torque and velocity at the first sample without a fade in;
-///         the last one sent is rest at the position reached: torque and velocity 0, position 0 or where a table that
-///         travels has got to, without going back. A drive that fails is not sent set-points any more: it is told to
-///         stop.
+///         included, but for torque and velocity at the first sample without a fade in; the last one sent is rest at
+///         the position reached: torque and velocity 0, position 0 or where a table that travels has got to, without
+///         going back. A drive that fails is not sent set-points any more: it is told to stop.
 /// Returns 0 if complete; else an error. *out_run then holds what was measured; it is empty, with nothing to free, if
 /// out_run->rows is 0.
 /// Test:   tests/unit/test_measure.c

@@ -4,15 +4,6 @@
 #include <lapacke.h>
 #include <math.h>
 
-/// Present if the LAPACK in use is OpenBLAS.
-extern void openblas_set_num_threads(int threads) __attribute__((weak));
-
-void cholesky_use_one_thread(void)
-{
-    if (openblas_set_num_threads)
-        openblas_set_num_threads(1);
-}
-
 bool cholesky_solve(size_t n, double *inout_A, double *inout_x)
 {
     const lapack_int order = (lapack_int)n;

@@ -6,10 +6,6 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/// Keeps linear algebra on the calling thread: for searches that have threads of their own, and so that sums come out
-/// the same on every machine. Call it before the threads are started.
-void cholesky_use_one_thread(void);
-
 /// Solves A x = b.
 /// Shapes: inout_A: n x n, lower triangle of a column-major matrix, overwritten by its factor; inout_x: b, then x
 /// Errors: false if A is not positive definite; inout_x is undefined then

@@ -1,27 +1,19 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/numeric/least_squares.h"
 
+#include "lab/numeric/blas.h"
+#include "lab/numeric/vector.h"
+
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
-
-/// Present if the LAPACK in use is OpenBLAS, whose threads only get in each other's way on systems this small.
-extern void openblas_set_num_threads(int threads) __attribute__((weak));
-
-static double dot(size_t n, const double *a, const double *b)
-{
-    double sum = 0.0;
-    for (size_t i = 0; i < n; i++)
-        sum += a[i] * b[i];
-    return sum;
-}
 
 /// Column norms, prior included; zero columns get norm 1 so that they drop out instead of dividing by zero.
 static void column_norms(size_t rows, size_t columns, const double *A, const double *weight, double *out_norm)
 {
     for (size_t i = 0; i < columns; i++) {
         double w = weight ? weight[i] : 0.0;
-        double norm = sqrt(dot(rows, A + i * rows, A + i * rows) + w * w);
+        double norm = sqrt(vector_dot(rows, A + i * rows, A + i * rows) + w * w);
         out_norm[i] = norm > 0.0 ? norm : 1.0;
     }
 }
@@ -32,9 +24,9 @@ static void normal_equations(size_t rows, size_t columns, const double *A, const
     for (size_t i = 0; i < columns; i++) {
         double w = weight ? weight[i] / norm[i] : 0.0;
         double target = centre ? centre[i] * norm[i] : 0.0;
-        out_g[i] = dot(rows, A + i * rows, b) / norm[i] + w * w * target;
+        out_g[i] = vector_dot(rows, A + i * rows, b) / norm[i] + w * w * target;
         for (size_t j = 0; j <= i; j++) {
-            double h = dot(rows, A + i * rows, A + j * rows) / (norm[i] * norm[j]);
+            double h = vector_dot(rows, A + i * rows, A + j * rows) / (norm[i] * norm[j]);
             out_H[i * columns + j] = out_H[j * columns + i] = h;
         }
         out_H[i * columns + i] += w * w;
@@ -69,14 +61,13 @@ static void store_covariance(size_t columns, const double *inverse, const double
 bool least_squares_solve(size_t rows, size_t columns, const double *A, const double *b, const double *weight,
                          const double *centre, double *out_x, double *out_covariance)
 {
-    if (openblas_set_num_threads)
-        openblas_set_num_threads(1);
+    blas_use_one_thread();
     double *work = malloc((columns * columns + 3 * columns) * sizeof *work);
     if (!work)
         return false;
     double *H = work, *g = H + columns * columns, *norm = g + columns, *gram = norm + columns;
     for (size_t i = 0; i < columns; i++)
-        gram[i] = dot(rows, A + i * rows, A + i * rows) + (weight ? weight[i] * weight[i] : 0.0);
+        gram[i] = vector_dot(rows, A + i * rows, A + i * rows) + (weight ? weight[i] * weight[i] : 0.0);
     column_norms(rows, columns, A, weight, norm);
     normal_equations(rows, columns, A, b, weight, centre, norm, H, g);
     lapack_int n = (lapack_int)columns;

@@ -15,8 +15,9 @@ double statistics_chi2_cdf(double x, double dof);
 /// Returns P(X > x) of the chi-square distribution; keeps its digits where the probability is tiny.
 double statistics_chi2_tail(double x, double dof);
 
-/// Returns P(X <= x) of the F distribution, the regularised incomplete beta function I_z(d1/2, d2/2), z = d1 x/(d1 x +
-/// d2). Range:  d1, d2 > 0, x >= 0; NaN outside
+/// Returns P(X <= x) of the F distribution, the regularised incomplete beta function I_z(d1/2, d2/2),
+/// z = d1 x / (d1 x + d2).
+/// Range:  d1, d2 > 0, x >= 0; NaN outside
 double statistics_f_cdf(double x, double d1, double d2);
 
 /// Returns P(X > x) of the F distribution; keeps its digits where the probability is tiny.

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/numeric/tall_qr.h"
 
+#include "lab/numeric/blas.h"
+
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
@@ -9,14 +11,9 @@
 /// A block of this many rows and its factor stay in the first-level cache for up to 25 columns.
 enum { rows_per_block = 128 };
 
-/// Present if the LAPACK in use is OpenBLAS, whose threads only get in each other's way on blocks this small.
-extern void openblas_set_num_threads(int threads) __attribute__((weak));
-
 bool tall_qr_init(struct tall_qr *out_self, size_t columns)
 {
-    if (openblas_set_num_threads) {
-        openblas_set_num_threads(1);
-    }
+    blas_use_one_thread();
     *out_self = (struct tall_qr){.columns = columns, .capacity = columns + rows_per_block, .finite = true};
     out_self->block = malloc(out_self->capacity * columns * sizeof *out_self->block);
     out_self->tau = malloc(2 * columns * sizeof *out_self->tau);

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/numeric/trust_region.h"
 
+#include "lab/numeric/cholesky.h"
+#include "lab/numeric/vector.h"
+
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
@@ -17,22 +20,6 @@ struct state {
     double *solved;           ///< n, scratch of the secular equation
     double radius, lambda, step_length;
 };
-
-static double norm(size_t n, const double *x)
-{
-    double sum = 0.0;
-    for (size_t i = 0; i < n; i++)
-        sum += x[i] * x[i];
-    return sqrt(sum);
-}
-
-static double dot(size_t n, const double *a, const double *b)
-{
-    double sum = 0.0;
-    for (size_t i = 0; i < n; i++)
-        sum += a[i] * b[i];
-    return sum;
-}
 
 static double largest(size_t n, const double *x)
 {
@@ -51,10 +38,9 @@ static bool solve(struct state *self, double lambda)
         self->factor[i * n + i] += lambda;
         self->step[i] = -self->g[i];
     }
-    lapack_int order = (lapack_int)n;
-    if (LAPACKE_dposv(LAPACK_COL_MAJOR, 'L', order, 1, self->factor, order, self->step, order) != 0)
+    if (!cholesky_solve(n, self->factor, self->step))
         return false;
-    self->step_length = norm(n, self->step);
+    self->step_length = vector_length(n, self->step);
     return isfinite(self->step_length);
 }
 
@@ -64,7 +50,7 @@ static double corrected(struct state *self, double lambda)
     lapack_int order = (lapack_int)self->n;
     memcpy(self->solved, self->step, self->n * sizeof(double));
     LAPACKE_dtrtrs(LAPACK_COL_MAJOR, 'L', 'N', 'N', order, 1, self->factor, order, self->solved, order);
-    double ratio = self->step_length / norm(self->n, self->solved);
+    double ratio = self->step_length / vector_length(self->n, self->solved);
     return lambda + ratio * ratio * (self->step_length - self->radius) / self->radius;
 }
 
@@ -78,7 +64,7 @@ static void find_step(struct state *self)
         most = fmax(most, self->H[i * self->n + i]);
     const double least = 1e-12 * most * (double)self->n;
     double low = least;
-    double high = fmax(norm(self->n, self->g) / self->radius, 2.0 * least);
+    double high = fmax(vector_length(self->n, self->g) / self->radius, 2.0 * least);
     double lambda = self->lambda > low && self->lambda < high ? self->lambda : low;
     for (int i = 0; i < corrections_max; i++) {
         if (!solve(self, lambda)) {
@@ -103,7 +89,7 @@ static void find_step(struct state *self)
 /// Decrease of the cost that the linear model expects: -2 g's - s'Hs, with H s = -g - lambda s.
 static double predicted(const struct state *self)
 {
-    return -dot(self->n, self->g, self->step) + self->lambda * self->step_length * self->step_length;
+    return -vector_dot(self->n, self->g, self->step) + self->lambda * self->step_length * self->step_length;
 }
 
 /// Tries the step; takes it if it lowers the cost, and adapts the radius. Returns whether it was good enough to judge
@@ -151,7 +137,7 @@ static void search(struct state *self, const struct trust_region_limits *limits,
         outcome->steps++;
         moved = decrease > 0.0;
         if ((as_predicted && decrease < limits->cost_tolerance * before) ||
-            self->step_length < limits->step_tolerance * (limits->step_tolerance + norm(self->n, inout_x)))
+            self->step_length < limits->step_tolerance * (limits->step_tolerance + vector_length(self->n, inout_x)))
             return;
     }
 }
@@ -170,7 +156,7 @@ bool trust_region_minimise(const struct trust_region_problem *problem, const str
     self.step = self.g + n;
     self.trial = self.step + n;
     self.solved = self.trial + n;
-    double length = norm(n, inout_x);
+    double length = vector_length(n, inout_x);
     self.radius = length > 0.0 ? length : 1.0;
     *out_outcome = (struct trust_region_outcome){0};
     search(&self, limits, inout_x, out_outcome);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /// Nonlinear least squares by Gauss-Newton steps inside a trust region, for problems whose Jacobian is too long to hand
-/// over: the caller gives J'J and J'e. (cminpack is the choice where J itself is small.)
+/// over: the caller gives J'J and J'e. (levenberg.h takes J itself.)
 #ifndef SERVOSCOPE_NUMERIC_TRUST_REGION_H
 #define SERVOSCOPE_NUMERIC_TRUST_REGION_H
 

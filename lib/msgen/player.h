@@ -56,8 +56,8 @@ struct msgen_player_config {
     uint32_t dwell_samples;    ///< after an approach: samples to stand there
     uint32_t fade_out_samples; ///< 0: stops after the last sample of the last period
     uint32_t abort_samples;    ///< at least 1
-    int32_t gain_q16
-        [msgen_channels_max]; ///< output units per count in Q16, negative turns the direction; 0: msgen_gain_one
+    /// Output units per count in Q16, negative turns the direction; 0: msgen_gain_one.
+    int32_t gain_q16[msgen_channels_max];
     int32_t limit[msgen_channels_max]; ///< largest |output|; 0: INT32_MAX
 };
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /// Symmetric systems: lab/numeric/cholesky.h.
+#include "lab/numeric/blas.h"
 #include "lab/numeric/cholesky.h"
 
 #include "unity.h"
@@ -10,7 +11,7 @@ static const double rounding = 1e-14;
 
 void setUp(void)
 {
-    cholesky_use_one_thread();
+    blas_use_one_thread();
 }
 
 void tearDown(void) {}

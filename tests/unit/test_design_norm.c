@@ -153,7 +153,7 @@ static void test_norm_variables_keep_the_tolerance_and_come_back(void)
 /// The gradient of a minimum is 0, and Newton's steps get there where 60 of the gradient descent have not.
 static void test_newton_finds_a_stationary_point(void)
 {
-    const struct design_newton_plan plan = {.first_exponent = 4, .last_exponent = 6, .step = 1, .steps = 60};
+    const struct design_newton_plan plan = {.first_exponent = 4, .last_exponent = 6, .steps = 60};
     struct design_norm norm;
     double c[2 * lines];
     double gradient[variables_max];
@@ -174,8 +174,8 @@ static void test_newton_finds_a_stationary_point(void)
 
 static void assert_descent_lowers_the_peak(double tolerance_db)
 {
-    const struct design_newton_plan newton = {.first_exponent = 3, .last_exponent = 10, .step = 1, .steps = 10};
-    const struct design_polish_plan gradient = {.first_exponent = 3, .last_exponent = 10, .step = 1, .iterations = 40};
+    const struct design_newton_plan newton = {.first_exponent = 3, .last_exponent = 10, .steps = 10};
+    const struct design_polish_plan gradient = {.first_exponent = 3, .last_exponent = 10, .iterations = 40};
     double c[2 * lines];
     double scores[2];
     create(tolerance_db, 1);

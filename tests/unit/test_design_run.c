@@ -301,6 +301,39 @@ static void test_run_refuses_lines_that_make_no_sense(void)
     assert_refused("method: 'newton', expected one of fast, mca");
 }
 
+static void test_run_refuses_a_torque_shape_that_is_none(void)
+{
+    double shape[line_count];
+    const double wrong[] = {0, -1, NAN, INFINITY};
+    request.torque_shape = shape;
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        for (size_t k = 0; k < line_count; k++) {
+            shape[k] = k == 6 ? wrong[i] : 1;
+        }
+        assert_refused("line 7: torque");
+    }
+}
+
+/// Squares of these are beyond a double: a design of NaN must not pass for one.
+static void test_run_refuses_what_leaves_no_finite_design(void)
+{
+    request.method = "schroeder";
+    request.limits = (struct design_limits){.position_rad = 1e-300};
+    TEST_ASSERT_EQUAL_INT(error_refused, design_run(&request, &result, &error));
+    TEST_ASSERT_NOT_NULL(strstr(error.message, "effective torque"));
+    TEST_ASSERT_NULL(result.torque_Nm);
+}
+
+/// A stop that comes when there is nothing to stop interrupts nothing.
+static void test_run_of_a_formula_is_never_interrupted(void)
+{
+    static volatile sig_atomic_t stop = 1;
+    request.stop_requested = &stop;
+    request.method = "newman";
+    run();
+    TEST_ASSERT_FALSE(result.interrupted);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -318,5 +351,8 @@ int main(void)
     RUN_TEST(test_run_with_a_prime_period);
     RUN_TEST(test_run_refuses_limits_that_make_no_sense);
     RUN_TEST(test_run_refuses_lines_that_make_no_sense);
+    RUN_TEST(test_run_refuses_a_torque_shape_that_is_none);
+    RUN_TEST(test_run_refuses_what_leaves_no_finite_design);
+    RUN_TEST(test_run_of_a_formula_is_never_interrupted);
     return UNITY_END();
 }

@@ -5,6 +5,7 @@
 #include "lab/design/lines.h"
 #include "lab/design/offset.h"
 #include "lab/design/predict.h"
+#include "lab/design/sequence.h"
 #include "lab/record/json_out.h"
 #include "lab/record/model_file.h"
 #include "tools/servoscope/command.h"
@@ -301,7 +302,8 @@ static int run(int argc, char **argv, const struct command_context *context, str
     work.request.progress_context = &work;
     terminal_line_start(&work.line, context);
     interrupt_catch(&signals, true);
-    const bool sequence = options.inputs > 1 || sequence_specification(options.lines);
+    // With several inputs any specification makes a sequence.
+    const bool sequence = options.inputs > 1 || design_sequence_is(options.lines);
     status = sequence ? design_sequence(&work, out_error) : design_multisine(&work, out_error);
     interrupt_release(&signals);
     return status;
@@ -348,7 +350,7 @@ const struct command command_cmd_design = {
             "                       linf: p-norms to 512 by least squares, slow; mca: modified clipping\n"
             "                       clip: standard clipping (--keep all or acceleration)\n"
             "                       newman, schroeder (default of sequences), random: not optimised\n"
-            "  --iterations I       of fast (projections), mca, clip\n"
+            "  --iterations I       of fast, mca, clip, linf\n"
             "  --starts S           of fast: the first is always the same, further ones are drawn by --seed\n"
             "  --time-budget S      of fast: starts for so many seconds\n"
             "  --threads T          default: all processors; the result does not depend on it\n"

@@ -34,11 +34,6 @@ struct work {
     size_t path_size;
 };
 
-bool sequence_specification(const char *specification)
-{
-    return design_sequence_is(specification);
-}
-
 static int refuse_memory(struct error *out_error)
 {
     return error_set(out_error, error_refused, "memory is short for the sequence");

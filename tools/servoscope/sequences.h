@@ -49,9 +49,6 @@ struct sequences_summary {
     cJSON *segments; ///< array: what describe() gave, with "file", "input", "periods" and "table_crc32"
 };
 
-/// Whether --lines names a sequence; with several inputs any specification makes one.
-bool sequence_specification(const char *specification);
-
 /// Designs and writes everything, the manifest last; an old manifest of that name goes before the first table.
 /// Errors: error_usage, error_refused: what design_sequence_parse(), design_run(), judge() and the files say, with the
 ///         segment; tables written until then are removed again
