@@ -196,7 +196,7 @@ static size_t valid_lines(const struct frf *frf)
     return count;
 }
 
-static bool set_confidence(struct frf *io_frf)
+bool estimate_set_confidence(struct frf *io_frf)
 {
     /* Real degrees of freedom come in pairs: two for each complex one. */
     double factor = circle_confidence_factor(0.95, io_frf->degrees_of_freedom / 2.0);
@@ -213,7 +213,8 @@ int estimate_end(const struct periodic *recording, struct frf *io_frf, struct er
             "--lines",
             recording->run->path, recording->input, recording->bin_count);
     }
-    bool set = set_confidence(io_frf) && estimate_set_key(io_frf, "settle_periods", "%zu", recording->settle) &&
+    bool set = estimate_set_confidence(io_frf) &&
+               estimate_set_key(io_frf, "settle_periods", "%zu", recording->settle) &&
                estimate_set_key(io_frf, "settle_from", "%s", settle_source_name(recording->settle_source)) &&
                estimate_set_key(io_frf, "period_samples", "%zu", recording->period_samples) &&
                estimate_set_key(io_frf, "sample_rate_hz", "%.17g", recording->run->sample_rate_hz);
@@ -232,7 +233,7 @@ int estimate_end_arbitrary(const struct arbitrary *recording, struct frf *io_frf
                          "--input, --reference",
                          recording->run->path, recording->input);
     }
-    bool set = set_confidence(io_frf) && estimate_set_key(io_frf, "rows", "%zu", recording->rows) &&
+    bool set = estimate_set_confidence(io_frf) && estimate_set_key(io_frf, "rows", "%zu", recording->rows) &&
                estimate_set_key(io_frf, "sample_rate_hz", "%.17g", recording->run->sample_rate_hz);
     if (set && recording->lost > 0) {
         set = estimate_set_key(io_frf, "lost_rows", "%zu", recording->lost);
@@ -369,7 +370,7 @@ int estimate_average(const struct frf *realisations, size_t count, struct frf *o
     for (size_t line = 0; line < first->count; line++) {
         average_line(realisations, count, line, out_frf);
     }
-    if (!set_confidence(out_frf) || !estimate_set_key(out_frf, "realisations", "%zu", count) ||
+    if (!estimate_set_confidence(out_frf) || !estimate_set_key(out_frf, "realisations", "%zu", count) ||
         !estimate_set_key(out_frf, "noise_degrees_of_freedom", "%.6g", noise_degrees)) {
         return estimate_refuse_memory(out_frf, out_error);
     }

@@ -63,6 +63,9 @@ bool estimate_warn_of_reference(const char *reference, struct frf *io_frf);
 /// Value of a key of a response; "" if it is not there.
 const char *estimate_key(const struct frf *frf, const char *key);
 
+/// Sets the key confidence_95_factor from the degrees of freedom. Errors: false if memory is short.
+bool estimate_set_confidence(struct frf *io_frf);
+
 /// Sets a key of a response, replacing an equal one. Errors: false if memory is short.
 bool estimate_set_key(struct frf *io_frf, const char *key, const char *format, ...)
 #if defined(__GNUC__)

@@ -446,8 +446,8 @@ static int select_periods(struct online *self, struct online_result *out, struct
         self->run.path, out->used, out->total, out->settle, out->lost);
 }
 
-/// F11, F12, as frf_mean_estimate: with D = G - G_0, sum |(E - Ebar) - D (U - Ubar)|^2 is S_ee + |D|^2 S_uu - 2 Re(conj D
-/// S_eu), whose last two terms are small.
+/// F11, F12, as frf_mean_estimate: with D = G - G_0, sum |(E - Ebar) - D (U - Ubar)|^2 is S_ee + |D|^2 S_uu - 2 Re(conj
+/// D S_eu), whose last two terms are small.
 static void set_line(const struct online *self, const struct online_result *result, size_t b, double certain_ratio,
                      struct frf *io_frf)
 {

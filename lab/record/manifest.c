@@ -6,12 +6,15 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 bool manifest_is(const char *path)
 {
     static const char byte_order_mark[] = "\xEF\xBB\xBF";
     char text[64] = "";
-    FILE *stream = fopen(path, "rb");
+    struct stat file;
+    /* What is read of a pipe is gone. */
+    FILE *stream = stat(path, &file) == 0 && S_ISREG(file.st_mode) ? fopen(path, "rb") : NULL;
     if (!stream) {
         return false;
     }

@@ -41,8 +41,8 @@ bool run_is_field_key(const char *key);
 /// Begins to judge rows; run->columns and the keys are there.
 void run_checks_begin(struct run_checks *self, const struct run *run, const struct run_options *options);
 
-/// Judges the table's rows from first_row on, which follow those judged before: sizes, `valid`, time stamps. What a step
-/// of time should be is the median of the first 65536.
+/// Judges the table's rows from first_row on, which follow those judged before: sizes, `valid`, time stamps. What a
+/// step of time should be is the median of the first 65536.
 int run_checks_rows(struct run_checks *self, const struct text_table *table, const struct run *run, size_t first_row,
                     struct error *out_error);
 

@@ -22,8 +22,8 @@ int run_stream_open(const char *path, const struct run_options *options, struct 
 /// Test:   tests/unit/test_run_stream.c
 int run_stream_fill(struct run_stream *self, size_t rows, struct error *out_error);
 
-/// What is in memory: names, keys in front of the names, rows since the last run_stream_forget. `sample_rate_hz` is that
-/// of the time stamps so far where no key and no option says it. Valid until the next call; belongs to the stream.
+/// What is in memory: names, keys in front of the names, rows since the last run_stream_forget. `sample_rate_hz` is
+/// that of the time stamps so far where no key and no option says it. Valid until the next call; belongs to the stream.
 const struct run *run_stream_run(const struct run_stream *self);
 
 /// Whether the file has no further rows.
@@ -40,7 +40,8 @@ void run_stream_forget(struct run_stream *self);
 int run_stream_split(struct run_stream *self, struct run *out_run, struct error *out_error);
 
 /// After the end: the checks that need the whole file. run_stream_run then has the final rate.
-/// Errors: error_refused: periods that do not fit the rows, a rate that contradicts the time stamps, and, once rows have
+/// Errors: error_refused: periods that do not fit the rows, a rate that contradicts the time stamps, and, once rows
+///         have
 ///         been forgotten, a key behind the row of names that would have changed how they are understood
 int run_stream_finish(struct run_stream *self, struct error *out_error);
 

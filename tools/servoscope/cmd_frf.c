@@ -3,6 +3,7 @@
 #include "lab/design/lines.h"
 #include "lab/estimate/advise.h"
 #include "lab/estimate/arbitrary.h"
+#include "lab/estimate/clocked.h"
 #include "lab/estimate/method.h"
 #include "lab/estimate/periodic.h"
 #include "lab/estimate/setup.h"
@@ -226,20 +227,22 @@ static int estimate_without_period(const struct run *run, const struct request *
 static int estimate_periods(const struct run *run, const struct request *request, const struct inputs *inputs,
                             struct frf *out_frf, struct estimating_summary *out_summary, struct error *out_error)
 {
-    struct periodic recording;
-    int status = periodic_cut(run, &request->cut, &recording, out_error);
-    if (status && recording.aperiodic && request->method->estimate_arbitrary) {
+    struct clocked clocked;
+    const struct periodic *recording = &clocked.recording;
+    int status = clocked_cut(run, &request->cut, false, &clocked, out_error);
+    if (status && recording->aperiodic && request->method->estimate_arbitrary) {
         return estimate_without_period(run, request, out_frf, out_summary, out_error);
     }
     if (status) {
         return status;
     }
-    status = request->method->estimate(&recording, &request->tuning, out_frf, out_error);
-    summarise(&recording, out_summary);
-    if (!status && !estimating_findings_measure(&recording, inputs, out_frf, &out_summary->findings)) {
+    status = request->method->estimate(recording, &request->tuning, out_frf, out_error);
+    summarise(recording, out_summary);
+    if (!status && (!estimating_findings_measure(recording, inputs, out_frf, &out_summary->findings) ||
+                    !estimating_checks_measure(&clocked, out_frf, &out_summary->checks))) {
         status = estimate_refuse_memory(out_frf, out_error);
     }
-    periodic_free(&recording);
+    clocked_free(&clocked);
     return status;
 }
 
@@ -382,6 +385,9 @@ static int finish(const struct arguments *arguments, const struct request *reque
     bool done = true;
     for (size_t r = 0; r < arguments->runs.count && done; r++) {
         done = estimating_findings_merge(&io_outcome->findings, &io_outcome->runs[r].findings);
+    }
+    for (size_t r = 0; r < arguments->runs.count && done; r++) {
+        done = estimating_checks_carry(&io_outcome->runs[r].checks, &io_outcome->frf);
     }
     setup_remove_delay(&io_outcome->frf, arguments->delay_s);
     done = done && setup_set_keys(&io_outcome->frf, request->hold, arguments->delay_s) &&

@@ -109,6 +109,7 @@ static void print_run(const char *path, const struct estimating_summary *run)
     } else {
         print_periods(path, run);
     }
+    estimating_checks_print(&run->checks);
     printf("  %s\n", run->advice.sentence);
 }
 
@@ -165,6 +166,7 @@ static cJSON *json_of_run(const char *path, const struct estimating_summary *run
     cJSON_AddNumberToObject(object, "transient_first_period", run->first_level);
     cJSON_AddNumberToObject(object, "transient_decay_per_period",
                             run->transient.decay_per_period > 0.0 ? run->transient.decay_per_period : NAN);
+    estimating_checks_add_json(&run->checks, object);
     return object;
 }
 

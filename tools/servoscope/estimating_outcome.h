@@ -7,6 +7,7 @@
 #include "lab/estimate/settle.h"
 #include "lab/record/error.h"
 #include "lab/record/frf_file.h"
+#include "tools/servoscope/estimating_checks.h"
 #include "tools/servoscope/estimating_findings.h"
 #include "tools/servoscope/estimating_sequence.h"
 #include "tools/servoscope/options.h"
@@ -36,6 +37,7 @@ struct estimating_summary {
     struct estimating_segments segments; ///< of a sequence; `planned` is 0 for a run by itself
     size_t used_most;                    ///< of a sequence; then `used` is that of the segment with the fewest
     struct estimating_findings findings;
+    struct estimating_checks checks;
 };
 
 /// A response as it is written, and what its runs say of it.

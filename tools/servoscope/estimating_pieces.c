@@ -1,16 +1,20 @@
 /* SPDX-License-Identifier: MIT */
 #include "tools/servoscope/estimating_pieces.h"
 
+#include "lab/estimate/clocked.h"
 #include "lab/estimate/frf_mean.h"
 #include "lab/estimate/method.h"
 #include "lab/estimate/online.h"
 #include "tools/servoscope/interrupt.h"
 
+#include <complex.h>
+#include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum {
-    leading_numbers = 1 << 22,
+    leading_numbers = 1 << 21,
     whole_numbers = 1 << 27,
     leading_periods = 4,
     piece_rows = 65536,
@@ -77,20 +81,21 @@ void estimating_pieces_free(struct estimating_pieces *self)
 static int find_in_leading(const struct run *run, const struct periodic_options *options, const struct inputs *inputs,
                            struct estimating_summary *io_summary, struct frf *out_frf, struct error *out_error)
 {
-    struct periodic recording;
-    int status = periodic_cut(run, options, &recording, out_error);
+    struct clocked clocked;
+    int status = clocked_cut(run, options, true, &clocked, out_error);
     if (status) {
         return status;
     }
-    status = frf_mean_estimate(&recording, NULL, out_frf, out_error);
+    status = frf_mean_estimate(&clocked.recording, NULL, out_frf, out_error);
     if (!status) {
-        estimate_advise(&recording, &io_summary->advice);
-        io_summary->leading_periods = recording.total;
-        if (!estimating_findings_measure(&recording, inputs, out_frf, &io_summary->findings)) {
+        estimate_advise(&clocked.recording, &io_summary->advice);
+        io_summary->leading_periods = clocked.recording.total;
+        if (!estimating_findings_measure(&clocked.recording, inputs, out_frf, &io_summary->findings) ||
+            !estimating_checks_measure(&clocked, out_frf, &io_summary->checks)) {
             status = estimate_refuse_memory(out_frf, out_error);
         }
     }
-    periodic_free(&recording);
+    clocked_free(&clocked);
     return status;
 }
 
@@ -133,7 +138,8 @@ static void summarise(const struct periodic *leading, const struct online_result
     io_summary->last_level = result->last_level;
 }
 
-static void copy_distortion(const struct frf *leading, struct frf *io_frf)
+/// What the leading part tells of the whole: distortion, warnings, how far std is too small.
+static bool copy_findings(const struct frf *leading, const struct estimating_checks *checks, struct frf *io_frf)
 {
     for (size_t line = 0; line < io_frf->count && line < leading->count; line++) {
         if (io_frf->valid[line]) {
@@ -141,16 +147,17 @@ static void copy_distortion(const struct frf *leading, struct frf *io_frf)
             io_frf->even_distortion[line] = leading->even_distortion[line];
         }
     }
+    return estimating_checks_apply(checks, io_frf);
 }
 
-/// A leading part that is left out for settling as a whole, or nearly so, shows nothing; its transient is found anyhow.
-static bool shows_settled(const struct periodic *leading, const struct periodic_options *options)
+/// A leading part that is left out for settling as a whole, or nearly so, shows nothing.
+static bool shows_settled(const struct run *run, const struct periodic_options *options)
 {
-    const struct run *run = leading->run;
-    size_t settle = options->settle == periodic_settle_given     ? options->settle_periods
-                    : options->settle == periodic_settle_default ? run->settle_periods
-                                                                 : 0;
-    return settle + leading_periods <= leading->total;
+    const size_t period = options->period_samples > 0 ? options->period_samples : run->period_samples;
+    const size_t settle = options->settle == periodic_settle_given     ? options->settle_periods
+                          : options->settle == periodic_settle_default ? run->settle_periods
+                                                                       : 0;
+    return period == 0 || settle + leading_periods <= run->rows / period;
 }
 
 static int estimate_rest(struct estimating_pieces *self, const struct periodic *leading,
@@ -171,28 +178,158 @@ static int estimate_rest(struct estimating_pieces *self, const struct periodic *
     return status;
 }
 
+/// One part's cut, with the lines and the period of the first; settling concerns the first alone.
+static int estimate_part(const struct run *part, const struct periodic_options *options, struct periodic *io_first,
+                         struct frf *out_frf, struct estimating_summary *io_summary, struct error *out_error)
+{
+    const bool is_first = io_first->bins == NULL;
+    struct periodic_options own = *options;
+    struct clocked clocked;
+    if (!is_first) {
+        own.period_samples = io_first->period_samples;
+        own.bins = io_first->bins;
+        own.bin_count = io_first->bin_count;
+        own.settle = periodic_settle_given;
+        own.settle_periods = 0;
+    }
+    int status = clocked_cut(part, &own, true, &clocked, out_error);
+    if (status) {
+        return status;
+    }
+    struct periodic *recording = &clocked.recording;
+    io_summary->total += recording->total;
+    io_summary->lost += recording->lost;
+    io_summary->used += recording->used;
+    io_summary->last_level = recording->output_level[recording->total - 1];
+    status = frf_mean_estimate(recording, NULL, out_frf, out_error);
+    if (is_first) {
+        io_summary->period_samples = recording->period_samples;
+        io_summary->period_found = recording->period_found;
+        io_summary->bins_found = recording->bins_found;
+        io_summary->settle = recording->settle;
+        io_summary->transient = recording->transient;
+        io_summary->first_level = recording->output_level[0];
+        io_summary->first_lost_row = recording->first_lost_row;
+        io_first->period_samples = recording->period_samples;
+        io_first->bin_count = recording->bin_count;
+        io_first->bins = recording->bins;
+        recording->bins = NULL;
+    }
+    clocked_free(&clocked);
+    return status;
+}
+
+/// Adds a part to the mean of all, weighed by its periods; std holds variances meanwhile. A line has to be valid in
+/// all.
+static void add_part(const struct frf *part, struct frf *io_frf)
+{
+    const double before = (double)io_frf->periods;
+    const double own = (double)part->periods;
+    const double share = own / (before + own);
+    for (size_t line = 0; line < io_frf->count; line++) {
+        const double kept = (1.0 - share) * (1.0 - share);
+        io_frf->frequency_hz[line] += share * (part->frequency_hz[line] - io_frf->frequency_hz[line]);
+        io_frf->real[line] += share * (part->real[line] - io_frf->real[line]);
+        io_frf->imag[line] += share * (part->imag[line] - io_frf->imag[line]);
+        io_frf->std[line] = kept * io_frf->std[line] + share * share * part->std[line] * part->std[line];
+        io_frf->valid[line] = io_frf->valid[line] && part->valid[line];
+    }
+    io_frf->degrees_of_freedom += part->degrees_of_freedom;
+    io_frf->periods += part->periods;
+}
+
+static int take_parts(struct estimating_pieces *self, const struct periodic_options *options, struct periodic *io_first,
+                      struct frf *io_frf, struct estimating_summary *io_summary, struct error *out_error)
+{
+    const size_t rows = self->run.rows;
+    struct terminal_line line;
+    terminal_line_start(&line, self->context);
+    int status = estimate_part(&self->run, options, io_first, io_frf, io_summary, out_error);
+    for (size_t i = 0; i < io_frf->count && !status; i++) {
+        io_frf->std[i] *= io_frf->std[i];
+    }
+    while (!status && !run_stream_ended(self->stream)) {
+        struct run part;
+        struct frf one = {.count = 0};
+        status = run_stream_fill(self->stream, rows, out_error);
+        status = status ? status : run_stream_split(self->stream, &part, out_error);
+        if (status) {
+            break;
+        }
+        part.periods = 0;
+        /* The last one may be too short to tell its own clock. */
+        if (part.rows / io_first->period_samples >= clock_fewest_periods) {
+            status = estimate_part(&part, options, io_first, &one, io_summary, out_error);
+        }
+        if (!status && one.count == io_frf->count) {
+            add_part(&one, io_frf);
+        }
+        frf_free(&one);
+        run_free(&part);
+        if (terminal_line_due(&line)) {
+            fprintf(stderr, "\r%.1f million rows   ", 1e-6 * (double)run_stream_rows(self->stream));
+        }
+    }
+    terminal_line_clear(&line);
+    return status ? status : run_stream_finish(self->stream, out_error);
+}
+
+static int estimate_parts(struct estimating_pieces *self, const struct periodic_options *options, struct frf *out_frf,
+                          struct estimating_summary *io_summary, struct error *out_error)
+{
+    struct periodic first = {.bins = NULL};
+    int status = take_parts(self, options, &first, out_frf, io_summary, out_error);
+    for (size_t line = 0; line < out_frf->count && !status; line++) {
+        const bool valid = out_frf->valid[line];
+        const double complex response = CMPLX(out_frf->real[line], out_frf->imag[line]);
+        estimate_set_line(out_frf, line, response, valid ? sqrt(out_frf->std[line]) : INFINITY);
+    }
+    if (!status && !(estimate_set_key(out_frf, "parts", "%zu", run_stream_rows(self->stream) / self->run.rows) &&
+                     estimate_set_confidence(out_frf))) {
+        status = estimate_refuse_memory(out_frf, out_error);
+    }
+    if (status) {
+        frf_free(out_frf);
+    }
+    free(first.bins);
+    return status;
+}
+
+/// All of the leading part's periods, also those that may be left out, for the sums to come.
+static int estimate_online(struct estimating_pieces *self, const struct periodic_options *options, struct frf *out_frf,
+                           struct estimating_summary *io_summary, struct error *out_error)
+{
+    struct periodic_options all = *options;
+    struct periodic leading;
+    all.settle = periodic_settle_given;
+    all.settle_periods = 0;
+    int status = periodic_cut(&self->run, &all, &leading, out_error);
+    if (!status) {
+        status = estimate_rest(self, &leading, options, out_frf, io_summary, out_error);
+        periodic_free(&leading);
+    }
+    return status;
+}
+
 int estimating_pieces_estimate(struct estimating_pieces *self, const struct periodic_options *options,
                                const struct inputs *inputs, struct frf *out_frf, struct estimating_summary *out_summary,
                                struct error *out_error)
 {
-    struct periodic_options all = *options;
-    struct periodic leading;
     struct frf found = {.count = 0};
     *out_summary = (struct estimating_summary){.used = 0};
-    all.settle = periodic_settle_given;
-    all.settle_periods = 0;
-    int status = periodic_cut(&self->run, &all, &leading, out_error);
-    if (status) {
-        return status;
-    }
-    if (shows_settled(&leading, options)) {
+    *out_frf = (struct frf){.count = 0};
+    int status = 0;
+    if (shows_settled(&self->run, options)) {
         status = find_in_leading(&self->run, options, inputs, out_summary, &found, out_error);
     }
-    status = status ? status : estimate_rest(self, &leading, options, out_frf, out_summary, out_error);
-    if (!status) {
-        copy_distortion(&found, out_frf);
+    if (!status && out_summary->checks.clock.state == clock_off) {
+        status = estimate_parts(self, options, out_frf, out_summary, out_error);
+    } else if (!status) {
+        status = estimate_online(self, options, out_frf, out_summary, out_error);
+    }
+    if (!status && !copy_findings(&found, &out_summary->checks, out_frf)) {
+        status = estimate_refuse_memory(out_frf, out_error);
     }
     frf_free(&found);
-    periodic_free(&leading);
     return status;
 }

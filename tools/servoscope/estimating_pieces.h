@@ -22,15 +22,18 @@ struct estimating_pieces {
     const struct command_context *context; ///< whether progress is shown; to be set after opening
 };
 
-/// Reads a recording whole if it has at most 4 Mi numbers (32 MiB), or if `needs_whole` (the method's name, NULL: none)
-/// and it has at most 128 Mi (1 GiB); else its leading part of 4 Mi numbers, or of four periods if that is longer.
+/// Reads a recording whole if it has at most 2 Mi numbers (16 MiB), or if `needs_whole` (the method's name, NULL: none)
+/// and it has at most 128 Mi (1 GiB); else its leading part of 2 Mi numbers, or of four periods if that is longer.
 /// `period_samples`: of the options, 0: the file's.
 /// Errors: as run_read; error_refused for a method that needs more than 1 GiB
 int estimating_pieces_open(const char *path, const struct run_options *options, const char *needs_whole,
                            size_t period_samples, struct estimating_pieces *out_self, struct error *out_error);
 
 /// Response of the whole recording by method mean. Columns, period and lines, and what else is found (distortion,
-/// repetition), come from the leading part; `inputs` as estimating_findings_measure. Once.
+/// repetition, clock), come from the leading part; `inputs` as estimating_findings_measure. Once.
+/// Where the leading part's true period is no whole number of samples, or drifts, the recording is taken as parts of
+/// the leading part's length, each resampled by itself; G is their mean, weighed by periods: it does not depend on
+/// where a part begins.
 /// Errors: as periodic_cut, run_stream_fill and online_end
 int estimating_pieces_estimate(struct estimating_pieces *self, const struct periodic_options *options,
                                const struct inputs *inputs, struct frf *out_frf, struct estimating_summary *out_summary,
