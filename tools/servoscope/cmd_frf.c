@@ -599,6 +599,10 @@ const struct command command_cmd_frf = {
         "torque_1_Nm, torque_2_Nm, ... gives a response for each output and input: FRF-OUTPUT-INPUT.csv. A response "
         "that\n"
         "repeats only after several periods is a warning: std does not hold then.\n"
+        "Of long recordings mean keeps only sums, so that memory does not grow. Where a true period is no whole number "
+        "of "
+        "samples,\n"
+        "or drifts, the recording is resampled to it.\n"
         "\n"
         "example:\n"
         "  servoscope frf run.csv --out frf.csv\n",

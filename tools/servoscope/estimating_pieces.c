@@ -239,7 +239,8 @@ static void add_part(const struct frf *part, struct frf *io_frf)
 }
 
 static int take_parts(struct estimating_pieces *self, const struct periodic_options *options, struct periodic *io_first,
-                      struct frf *io_frf, struct estimating_summary *io_summary, struct error *out_error)
+                      struct frf *io_frf, size_t *out_count, struct estimating_summary *io_summary,
+                      struct error *out_error)
 {
     const size_t rows = self->run.rows;
     struct terminal_line line;
@@ -263,6 +264,7 @@ static int take_parts(struct estimating_pieces *self, const struct periodic_opti
         }
         if (!status && one.count == io_frf->count) {
             add_part(&one, io_frf);
+            ++*out_count;
         }
         frf_free(&one);
         run_free(&part);
@@ -278,14 +280,14 @@ static int estimate_parts(struct estimating_pieces *self, const struct periodic_
                           struct estimating_summary *io_summary, struct error *out_error)
 {
     struct periodic first = {.bins = NULL};
-    int status = take_parts(self, options, &first, out_frf, io_summary, out_error);
+    size_t count = 1;
+    int status = take_parts(self, options, &first, out_frf, &count, io_summary, out_error);
     for (size_t line = 0; line < out_frf->count && !status; line++) {
         const bool valid = out_frf->valid[line];
         const double complex response = CMPLX(out_frf->real[line], out_frf->imag[line]);
         estimate_set_line(out_frf, line, response, valid ? sqrt(out_frf->std[line]) : INFINITY);
     }
-    if (!status && !(estimate_set_key(out_frf, "parts", "%zu", run_stream_rows(self->stream) / self->run.rows) &&
-                     estimate_set_confidence(out_frf))) {
+    if (!status && !(estimate_set_key(out_frf, "parts", "%zu", count) && estimate_set_confidence(out_frf))) {
         status = estimate_refuse_memory(out_frf, out_error);
     }
     if (status) {
