@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/tune/margins.h"
 
+#include "lab/tune/gap.h"
+
 #include <math.h>
 #include <stdbool.h>
 
@@ -15,6 +17,12 @@ static double decibel(double magnitude)
 static double between(const double *frequency_hz, size_t k, double share)
 {
     return frequency_hz[k] * pow(frequency_hz[k + 1] / frequency_hz[k], share);
+}
+
+/// Whether nothing is known between two lines: a curve drawn across would be made up.
+static bool is_gap(const double *frequency_hz, size_t k)
+{
+    return frequency_hz[k + 1] > GAP_RATIO_MOST * frequency_hz[k];
 }
 
 /// |L| falls or rises through 1 between lines k and k + 1.
@@ -104,7 +112,7 @@ static void find_cutoffs(size_t count, const double *frequency_hz, const double 
     double before = NAN;
     for (size_t k = 0; k < count; k++) {
         const double after = decibel(cabs(loop[k] / (1.0 + loop[k]))) - half_power_db;
-        if (k > 0 && (before >= 0.0) != (after >= 0.0)) {
+        if (k > 0 && !is_gap(frequency_hz, k - 1) && (before >= 0.0) != (after >= 0.0)) {
             add_crossing(between(frequency_hz, k - 1, before / (before - after)), after < 0.0, &crossings, io);
         }
         before = after;
@@ -121,7 +129,7 @@ void margins_find(size_t count, const double *frequency_hz, const double complex
             out_margins->modulus = sensitivity;
             out_margins->modulus_hz = frequency_hz[k];
         }
-        if (k + 1 < count) {
+        if (k + 1 < count && !is_gap(frequency_hz, k)) {
             take_crossover(frequency_hz, loop, k, out_margins);
             take_axis(frequency_hz, loop, k, out_margins);
         }

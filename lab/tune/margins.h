@@ -22,7 +22,8 @@ struct margins {
     double last_cutoff_hz; ///< the highest one; another one where T dips at an antiresonance
 };
 
-/// Finds the margins; between lines, log |L| and phase are taken as straight. Crossings of -3 dB within 10 % of each
+/// Finds the margins; between lines, log |L| and phase are taken as straight, but in a gap (lab/tune/gap.h), where
+/// nothing is found. Crossings of -3 dB within 10 % of each
 /// other are noise on one crossing.
 /// Shapes: frequency_hz, loop: count; frequencies ascend
 /// Test:   tests/unit/test_tune_margins.c

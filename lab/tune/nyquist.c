@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/tune/nyquist.h"
 
+#include "lab/tune/gap.h"
+
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -51,6 +53,20 @@ static bool leads_and_falls(const struct tune_plant *plant, const double complex
     }
     const double slope = log(cabs(response[k] / response[0])) / log(plant->frequency_hz[k] / plant->frequency_hz[0]);
     return first_phase(plant, response[0]) - centre > lead_least && slope < slope_most;
+}
+
+/// Whether the controller answers an error that stays: a derivative alone lets position or velocity drift.
+static bool check_hold(const struct tune_plant *plant, const struct tune_controller *controller,
+                       struct nyquist *io_nyquist)
+{
+    for (size_t i = 0; i < controller->structure->gains; i++) {
+        if (tune_term_power(controller->structure->terms[i]) <= 0 && controller->gain[i] > 0.0) {
+            return true;
+        }
+    }
+    give_up(io_nyquist, "nothing holds the %s: the gains are 0 but for the derivative's",
+            plant->output == tune_output_velocity ? "velocity" : "position");
+    return false;
 }
 
 static bool check_ends(const struct tune_plant *plant, const double complex *response, const double complex *loop,
@@ -106,16 +122,48 @@ static bool check_noise(const struct tune_plant *plant, const double complex *re
                         struct nyquist *io_nyquist)
 {
     for (size_t k = 0; k < plant->count; k++) {
-        const double radius = plant->confidence_factor * plant->std[k] * cabs(loop[k] / response[k]);
-        if (!(cabs(1.0 + loop[k]) > radius)) {
+        const double gain = cabs(loop[k] / response[k]);
+        const double noise = plant->confidence_factor * plant->std[k] * gain, doubt = plant->doubt[k] * gain;
+        if (cabs(1.0 + loop[k]) > noise + doubt) {
+            continue;
+        }
+        if (doubt > noise) {
+            give_up(io_nyquist, "at %.6g Hz the open loop is %.3g away from -1 and known to +-%.3g only: %s",
+                    plant->frequency_hz[k], cabs(1.0 + loop[k]), noise + doubt, plant->doubt_from);
+        } else {
             give_up(io_nyquist,
                     "at %.6g Hz the open loop is %.3g away from -1 and known to +-%.3g only (95 %%): noise decides, "
                     "expected more periods or a larger excitation there",
-                    plant->frequency_hz[k], cabs(1.0 + loop[k]), radius);
-            return false;
+                    plant->frequency_hz[k], cabs(1.0 + loop[k]), noise + doubt);
         }
+        return false;
     }
     return true;
+}
+
+/// Whether every resonance that no line shows would leave the count of turns as it is.
+static bool check_gaps(const struct tune_plant *plant, const double complex *response, const double complex *loop,
+                       struct nyquist *io_nyquist)
+{
+    struct gap gap;
+    char left_out[120], others[48] = "";
+    const size_t count = gap_find_worst(plant, response, loop, &gap);
+    if (count == 0) {
+        return true;
+    }
+    const double low_hz = plant->frequency_hz[gap.line], high_hz = plant->frequency_hz[gap.line + 1];
+    tune_plant_name_left_out(plant, low_hz, high_hz, sizeof left_out, left_out);
+    if (count > 1) {
+        snprintf(others, sizeof others, "; %zu more gap%s like it", count - 1, count > 2 ? "s" : "");
+    }
+    give_up(io_nyquist,
+            "between the lines at %.6g and %.6g Hz, where the open loop is at %.1f and %.1f dB, a resonance may hide "
+            "there that raises it by %.2g dB, and from %.2g dB on it may reach -1: expected lines between %.6g and "
+            "%.6g Hz%s%s%s%s",
+            low_hz, high_hz, decibel(cabs(loop[gap.line])), decibel(cabs(loop[gap.line + 1])), decibel(1.0 + gap.rise),
+            decibel(1.0 + gap.reach), low_hz, high_hz, left_out[0] ? " (" : "", left_out,
+            left_out[0] ? " not valid)" : "", others);
+    return false;
 }
 
 static void find_worst(const struct tune_plant *plant, const double complex *loop, struct nyquist *io_nyquist)
@@ -141,15 +189,24 @@ static void state_assumptions(const struct tune_plant *plant, struct nyquist *io
     snprintf(io_nyquist->assumptions[2], size,
              "above %.4g Hz, the highest line, the open loop's gain (%.1f dB there) does not rise above 0 dB",
              plant->frequency_hz[plant->count - 1], io_nyquist->last_gain_db);
+    const double lower_end_hz = gap_lower_end_hz(plant);
+    const int used =
+        snprintf(io_nyquist->assumptions[3], size,
+                 "no resonance between two lines has less damping than .01 or raises the open loop by more "
+                 "than 30 dB");
+    if (lower_end_hz > plant->frequency_hz[0]) {
+        snprintf(io_nyquist->assumptions[3] + used, size - (size_t)used,
+                 "; below %.4g Hz, where lines are sparse, it comes behind its antiresonance", lower_end_hz);
+    }
 }
 
 void nyquist_judge(const struct tune_plant *plant, const double complex *response, const double complex *loop,
-                   const struct tune_controller *controller, bool use_std, struct nyquist *out_nyquist)
+                   const struct tune_controller *controller, bool measured, struct nyquist *out_nyquist)
 {
     *out_nyquist = (struct nyquist){.verdict = nyquist_undecided};
     find_worst(plant, loop, out_nyquist);
     state_assumptions(plant, out_nyquist);
-    if (!check_ends(plant, response, loop, out_nyquist)) {
+    if (!check_hold(plant, controller, out_nyquist) || !check_ends(plant, response, loop, out_nyquist)) {
         return;
     }
     // Terms with gains >= 0 stay within 90 degrees of each other, and a biquad's phase within 180, so the controller's
@@ -157,13 +214,16 @@ void nyquist_judge(const struct tune_plant *plant, const double complex *respons
     // 90 degrees.
     const double controller_phase = carg(tune_controller_at(controller, plant->delay[0]));
     double phase = controller_phase + first_phase(plant, response[0]) + carg(1.0 + 1.0 / loop[0]);
+    if (measured && !check_gaps(plant, response, loop, out_nyquist)) {
+        return;
+    }
     for (size_t k = 0; k + 1 < plant->count; k++) {
         if (!check_step(plant, response, loop, k, out_nyquist)) {
             return;
         }
         phase += carg((1.0 + loop[k + 1]) / (1.0 + loop[k]));
     }
-    if (use_std && !check_noise(plant, response, loop, out_nyquist)) {
+    if (measured && !check_noise(plant, response, loop, out_nyquist)) {
         return;
     }
     const long turns = lround((phase - carg(1.0 + loop[plant->count - 1])) / (2.0 * pi));

@@ -3,6 +3,7 @@
 
 #include "lab/estimate/report.h"
 #include "lab/page/layout.h"
+#include "lab/tune/gap.h"
 #include "lab/tune/say.h"
 
 #include <complex.h>
@@ -20,9 +21,11 @@ static double decibel(double magnitude)
     return 20.0 * log10(magnitude); // minus infinity for 0: a gap in the figure
 }
 
-/// Every curve of the page, on the plant's lines.
+/// Every curve of the page, on the plant's lines; nothing is drawn across a gap, in which a point is put that is none.
 struct curves {
+    size_t count;
     double *memory;
+    double *frequency_hz;
     double *open_db, *open_low_db, *open_high_db, *open_deg, *open_deg_low, *open_deg_high;
     double *sensitivity_db, *closed_db, *closed_deg, *reference_db, *reference_deg;
     double *real, *imag;
@@ -34,46 +37,69 @@ static void unwrap(size_t count, double *phase_deg)
     double centre = -90.0;
     for (size_t k = 0; k < count; k++) {
         phase_deg[k] -= 360.0 * round((phase_deg[k] - centre) / 360.0);
-        centre = phase_deg[k];
+        centre = isnan(phase_deg[k]) ? centre : phase_deg[k];
     }
+}
+
+static bool is_gap(const struct tune_plant *plant, size_t line)
+{
+    const double *f = plant->frequency_hz;
+    return line + 1 < plant->count && f[line + 1] > GAP_RATIO_MOST * f[line] && f[line] >= gap_lower_end_hz(plant);
+}
+
+static void set_point(const struct tune_result *result, size_t line, size_t k, struct curves *out)
+{
+    const double complex loop = result->loop[line], closed = loop / (1.0 + loop);
+    const double share = 2.0 * result->plant.std[line] / cabs(result->plant.response[line]);
+    out->frequency_hz[k] = result->plant.frequency_hz[line];
+    out->open_db[k] = decibel(cabs(loop));
+    out->open_low_db[k] = decibel(cabs(loop) * fmax(1.0 - share, 0.0));
+    out->open_high_db[k] = decibel(cabs(loop) * (1.0 + share));
+    out->open_deg[k] = degrees_per_rad * carg(loop);
+    out->open_deg_high[k] = degrees_per_rad * (share < 1.0 ? asin(share) : 0.5 * two_pi);
+    out->sensitivity_db[k] = decibel(1.0 / cabs(1.0 + loop));
+    out->closed_db[k] = decibel(cabs(closed));
+    out->closed_deg[k] = degrees_per_rad * carg(closed);
+    out->reference_db[k] = decibel(cabs(result->reference[line]));
+    out->reference_deg[k] = degrees_per_rad * carg(result->reference[line]);
+    out->real[k] = creal(loop);
+    out->imag[k] = cimag(loop);
 }
 
 static bool make_curves(const struct tune_result *result, struct curves *out)
 {
-    enum { arrays = 13 };
-    const size_t count = result->plant.count;
-    out->memory = malloc(arrays * count * sizeof *out->memory);
+    enum { arrays = 14 };
+    const struct tune_plant *plant = &result->plant;
+    out->count = plant->count;
+    for (size_t line = 0; line < plant->count; line++) {
+        out->count += is_gap(plant, line);
+    }
+    out->memory = malloc(arrays * out->count * sizeof *out->memory);
     if (!out->memory) {
         return false;
     }
     double **const all[arrays] = {
-        &out->open_db,       &out->open_low_db,    &out->open_high_db, &out->open_deg,   &out->open_deg_low,
-        &out->open_deg_high, &out->sensitivity_db, &out->closed_db,    &out->closed_deg, &out->reference_db,
-        &out->reference_deg, &out->real,           &out->imag,
+        &out->open_db,       &out->open_low_db,    &out->open_high_db, &out->open_deg,     &out->open_deg_low,
+        &out->open_deg_high, &out->sensitivity_db, &out->closed_db,    &out->closed_deg,   &out->reference_db,
+        &out->reference_deg, &out->real,           &out->imag,         &out->frequency_hz,
     };
     for (size_t i = 0; i < arrays; i++) {
-        *all[i] = out->memory + i * count;
+        *all[i] = out->memory + i * out->count;
     }
-    for (size_t k = 0; k < count; k++) {
-        const double complex loop = result->loop[k], closed = loop / (1.0 + loop);
-        const double share = 2.0 * result->plant.std[k] / cabs(result->plant.response[k]);
-        out->open_db[k] = decibel(cabs(loop));
-        out->open_low_db[k] = decibel(cabs(loop) * fmax(1.0 - share, 0.0));
-        out->open_high_db[k] = decibel(cabs(loop) * (1.0 + share));
-        out->open_deg[k] = degrees_per_rad * carg(loop);
-        out->open_deg_high[k] = degrees_per_rad * (share < 1.0 ? asin(share) : 0.5 * two_pi);
-        out->sensitivity_db[k] = decibel(1.0 / cabs(1.0 + loop));
-        out->closed_db[k] = decibel(cabs(closed));
-        out->closed_deg[k] = degrees_per_rad * carg(closed);
-        out->reference_db[k] = decibel(cabs(result->reference[k]));
-        out->reference_deg[k] = degrees_per_rad * carg(result->reference[k]);
-        out->real[k] = creal(loop);
-        out->imag[k] = cimag(loop);
+    size_t k = 0;
+    for (size_t line = 0; line < plant->count; line++) {
+        set_point(result, line, k++, out);
+        if (is_gap(plant, line)) {
+            for (size_t i = 0; i < arrays; i++) {
+                (*all[i])[k] = NAN;
+            }
+            out->frequency_hz[k++] = sqrt(plant->frequency_hz[line] * plant->frequency_hz[line + 1]);
+        }
     }
-    unwrap(count, out->open_deg);
-    unwrap(count, out->closed_deg);
-    unwrap(count, out->reference_deg);
-    for (size_t k = 0; k < count; k++) {
+    unwrap(out->count, out->open_deg);
+    unwrap(out->count, out->closed_deg);
+    unwrap(out->count, out->reference_deg);
+    for (k = 0; k < out->count; k++) {
         out->open_deg_low[k] = out->open_deg[k] - out->open_deg_high[k];
         out->open_deg_high[k] = out->open_deg[k] + out->open_deg_high[k];
     }
@@ -137,14 +163,17 @@ static void add_margins(struct page *page, const struct tune_result *result)
     page_start_table(page, "Margins", "lrrlr", heads);
     for (size_t i = 0; i < count; i++) {
         char value[32], std[32], at[32];
-        if (!isfinite(margins[i].value) && i > 0) {
-            continue; // a dash says that the gain may rise without limit; of the others it would say nothing
+        if (!isfinite(margins[i].value)) {
+            if (margins[i].none) {
+                const char *cells[] = {margins[i].name, NULL, NULL, margins[i].none, NULL};
+                page_add_row(page, cells);
+            }
+            continue;
         }
         snprintf(value, sizeof value, "%.4g", margins[i].value);
         snprintf(std, sizeof std, "%.2g", margins[i].std);
         snprintf(at, sizeof at, "%.4g", margins[i].at_hz);
-        const char *cells[] = {margins[i].name, isfinite(margins[i].value) ? value : NULL,
-                               isfinite(margins[i].std) ? std : NULL, margins[i].unit,
+        const char *cells[] = {margins[i].name, value, isfinite(margins[i].std) ? std : NULL, margins[i].unit,
                                isfinite(margins[i].at_hz) ? at : NULL};
         page_add_row(page, cells);
     }
@@ -158,16 +187,22 @@ static void add_margins(struct page *page, const struct tune_result *result)
     }
 }
 
+static void add_warnings(struct page *page, const struct tune_result *result, size_t first, size_t end)
+{
+    for (size_t i = first; i < end; i++) {
+        const char *text = result->warnings[i];
+        page_add_note(page, page_warning, "Mind", "%c%s.", toupper((unsigned char)text[0]), text + 1);
+    }
+}
+
 static void add_verdict(struct page *page, const struct tune_result *result)
 {
     char gains[say_size], performance[say_size];
     say_gains(&result->plant, &result->solution.controller, gains);
     say_performance(result, performance);
+    add_warnings(page, result, 0, result->file_warning_count);
     page_add_note(page, page_good, gains, "%s", performance);
-    for (size_t i = 0; i < result->warning_count; i++) {
-        const char *text = result->warnings[i];
-        page_add_note(page, page_warning, "Mind", "%c%s.", toupper((unsigned char)text[0]), text + 1);
-    }
+    add_warnings(page, result, result->file_warning_count, result->warning_count);
 }
 
 static void add_stability(struct page *page, const struct tune_result *result)
@@ -189,8 +224,8 @@ static void add_stability(struct page *page, const struct tune_result *result)
 static void add_open_loop(struct page *page, const struct tune_result *result, const struct curves *curves)
 {
     struct figure figure;
-    const size_t count = result->plant.count;
-    const double *f = result->plant.frequency_hz;
+    const size_t count = curves->count;
+    const double *f = curves->frequency_hz;
     figure_start(&figure, "frequency in Hz", axis_log);
     struct figure_panel *magnitude = figure_add_panel(&figure, "open loop K G in dB", axis_linear);
     struct figure_panel *phase = figure_add_panel(&figure, "phase in degrees", axis_degrees);
@@ -206,11 +241,11 @@ static void add_open_loop(struct page *page, const struct tune_result *result, c
     page_add_figure(page, &figure, "Open loop: controller times measured response.");
 }
 
-static void add_closed_loop(struct page *page, const struct tune_result *result, const struct curves *curves)
+static void add_closed_loop(struct page *page, const struct curves *curves)
 {
     struct figure figure;
-    const size_t count = result->plant.count;
-    const double *f = result->plant.frequency_hz;
+    const size_t count = curves->count;
+    const double *f = curves->frequency_hz;
     figure_start(&figure, "frequency in Hz", axis_log);
     struct figure_panel *closed = figure_add_panel(&figure, "T = KG/(1+KG) in dB", axis_linear);
     struct figure_panel *phase = figure_add_panel(&figure, "phase of T in degrees", axis_degrees);
@@ -272,10 +307,10 @@ static void add_nyquist(struct page *page, const struct tune_result *result, con
     circle = figure_add_line(panel, "modulus margin: no nearer to -1", circle_points, modulus[0], modulus[1]);
     circle->colour = figure_vermilion;
     circle->dash = figure_dashed;
-    struct figure_series *curve = figure_add_line(panel, "K G", result->plant.count, curves->real, curves->imag);
+    struct figure_series *curve = figure_add_line(panel, "K G", curves->count, curves->real, curves->imag);
     curve->colour = figure_blue;
     curve->dash = figure_solid;
-    struct figure_series *lines = figure_add_points(panel, "", result->plant.count, curves->real, curves->imag);
+    struct figure_series *lines = figure_add_points(panel, "", curves->count, curves->real, curves->imag);
     lines->colour = figure_blue;
     lines->size = 3;
     struct figure_series *point = figure_add_points(panel, "-1", 1, &minus_one, &zero);
@@ -303,7 +338,7 @@ void tune_report_sections(struct page *page, const struct frf *frf, const struct
     add_stability(page, result);
     if (make_curves(result, &curves)) {
         page_add_section(page, "Closed loop");
-        add_closed_loop(page, result, &curves);
+        add_closed_loop(page, &curves);
         page_add_section(page, "Open loop");
         add_open_loop(page, result, &curves);
         add_nyquist(page, result, &curves);

@@ -63,14 +63,15 @@ size_t say_margins(const struct tune_result *result, struct say_margin out_margi
     const struct margins *m = &result->margins, *s = &result->deviation.margins;
     const bool known = result->deviation.known;
     const struct say_margin all[] = {
-        {"gain margin", "dB", m->gain_db, s->gain_db, m->gain_hz},
-        {"gain reduction margin", "dB", m->gain_reduction_db, s->gain_reduction_db, m->gain_reduction_hz},
-        {"phase margin", "degrees", m->phase_deg, s->phase_deg, m->phase_hz},
-        {"delay margin", "ms", 1e3 * m->delay_s, 1e3 * s->delay_s, NAN},
-        {"max |S|", "", m->modulus, s->modulus, m->modulus_hz},
-        {"crossover, |L| = 1", "Hz", m->crossover_hz, s->crossover_hz, NAN},
-        {"closed loop, first -3 dB", "Hz", m->cutoff_hz, s->cutoff_hz, NAN},
-        {"closed loop, last -3 dB", "Hz", m->last_cutoff_hz, s->last_cutoff_hz, NAN},
+        {"gain margin", "dB", m->gain_db, s->gain_db, m->gain_hz,
+         "no limit on these lines (never at -180 degrees below 0 dB)"},
+        {"gain reduction margin", "dB", m->gain_reduction_db, s->gain_reduction_db, m->gain_reduction_hz, NULL},
+        {"phase margin", "degrees", m->phase_deg, s->phase_deg, m->phase_hz, NULL},
+        {"delay margin", "ms", 1e3 * m->delay_s, 1e3 * s->delay_s, NAN, NULL},
+        {"max |S|", "", m->modulus, s->modulus, m->modulus_hz, NULL},
+        {"crossover, |L| = 1", "Hz", m->crossover_hz, s->crossover_hz, NAN, NULL},
+        {"closed loop, first -3 dB", "Hz", m->cutoff_hz, s->cutoff_hz, NAN, "not on these lines"},
+        {"closed loop, last -3 dB", "Hz", m->last_cutoff_hz, s->last_cutoff_hz, NAN, NULL},
     };
     const size_t count = sizeof all / sizeof *all;
     for (size_t i = 0; i < count; i++) {

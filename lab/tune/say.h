@@ -22,10 +22,12 @@ void say_filter(const struct tune_filter *filter, char out_text[say_size]);
 /// What the closed loop does, in a sentence.
 void say_performance(const struct tune_result *result, char out_text[say_size]);
 
-/// A margin: what it is called, its value and standard deviation (NaN: none), where it is (NaN: nowhere).
+/// A margin: what it is called, its value and standard deviation (NaN: none), where it is (NaN: nowhere), and what it
+/// means that it has no value (NULL: nothing).
 struct say_margin {
     const char *name, *unit;
     double value, std, at_hz;
+    const char *none;
 };
 
 enum { say_margins_max = 8 };

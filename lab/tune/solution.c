@@ -66,6 +66,9 @@ static int set_up(const struct tune_plant *plant, const struct resonance *resona
             return error_set(out_error, error_usage, "--corner: %.6g Hz, expected at most %.6g Hz (.45 of the rate)",
                              controller->corner_hz, corner_most_hz);
         }
+    } else if (options->corner_hz > 0.0) {
+        return error_set(out_error, error_usage, "--corner: %.6g Hz, but %s has no derivative: expected no --corner",
+                         options->corner_hz, structure->name);
     }
     return make_filter(plant, resonance, structure, options, &controller->filter, out_error);
 }

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/tune/tune.h"
 
+#include "lab/tune/gap.h"
 #include "lab/tune/say.h"
 #include "lab/tune/solution.h"
 
+#include <ctype.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -19,6 +21,12 @@ void tune_options_default(struct tune_options *out_options)
 
 static int check_options(const struct tune_options *options, const struct tune_plant *plant, struct error *out_error)
 {
+    // Beyond it 1 - z^-1 has few digits left at the lowest lines.
+    const double rate_most_hz = 1e7;
+    if (!(plant->rate_hz <= rate_most_hz)) {
+        return error_set(out_error, error_usage, "--rate: %.6g Hz, expected at most %.6g Hz", plant->rate_hz,
+                         rate_most_hz);
+    }
     // Above a quarter of the rate a sampled M of this form no longer has the bandwidth that it is named after.
     const double bandwidth_most_hz = 0.25 * plant->rate_hz;
     if (!(options->bandwidth_hz > 0.0 && options->bandwidth_hz <= bandwidth_most_hz)) {
@@ -127,16 +135,18 @@ static int refuse(const char *path, const struct tune_result *self, const struct
     }
     say_gains(&self->plant, &self->solution.controller, gains);
     advise(self, options, advice);
+    const char *mind = self->file_warning_count > 0 ? "; mind: " : "";
+    const char *warning = self->file_warning_count > 0 ? self->warnings[0] : "";
     if (nyquist->verdict == nyquist_undecided) {
         return error_set(out_error, error_refused,
-                         "%s: whether the %s loop for %.4g Hz (%s) is stable cannot be told: %s; try: %s", path,
-                         options->structure, options->bandwidth_hz, gains, nyquist->reason, advice);
+                         "%s: whether the %s loop for %.4g Hz (%s) is stable cannot be told: %s; try: %s%s%s", path,
+                         options->structure, options->bandwidth_hz, gains, nyquist->reason, advice, mind, warning);
     }
     return error_set(out_error, error_refused,
                      "%s: the %s loop for %.4g Hz would be unstable: %d poles outside the unit circle with %s, by the "
-                     "turns of the open loop round -1, which it passes at a distance of %.3g at %.4g Hz; try: %s",
+                     "turns of the open loop round -1, which it passes at a distance of %.3g at %.4g Hz; try: %s%s%s",
                      path, options->structure, options->bandwidth_hz, nyquist->unstable_poles, gains,
-                     nyquist->worst_distance, nyquist->worst_hz, advice);
+                     nyquist->worst_distance, nyquist->worst_hz, advice, mind, warning);
 }
 
 // ---- Warnings
@@ -160,7 +170,9 @@ static void warn_about_margins(struct tune_result *io_result)
     const struct margins *margins = &io_result->margins;
     const double modulus_usual = 2.0, cutoff_share = 0.7, near = 0.5;
     const struct resonance *resonance = &io_result->resonance;
-    const double cutoff_hz = tune_reference_cutoff_hz(&io_result->solution.reference);
+    const double reference_hz = tune_reference_cutoff_hz(&io_result->solution.reference);
+    // A reference that never falls below -3 dB has at least the bandwidth it is named after.
+    const double cutoff_hz = isfinite(reference_hz) ? reference_hz : io_result->solution.reference.bandwidth_hz;
     if (margins->modulus > modulus_usual) {
         warn(io_result, "max |S| is %.3g at %.4g Hz, above the usual limit of 2: little is left for drives that differ",
              margins->modulus, margins->modulus_hz);
@@ -190,6 +202,100 @@ static void warn_about_gains(struct tune_result *io_result)
     }
 }
 
+/// Keys by which a response's file speaks against itself.
+static bool is_warning(const char *key)
+{
+    static const char start[] = "warning_", end[] = "_warning";
+    const size_t length = strlen(key), tail = sizeof end - 1;
+    return strcmp(key, "warning") == 0 || strncmp(key, start, sizeof start - 1) == 0 ||
+           (length > tail && strcmp(key + length - tail, end) == 0);
+}
+
+/// Says them all before anything is certified. Refused is what no standard deviation covers and a better method avoids:
+/// a response drawn towards minus the inverse of the controller looks stable with it.
+static int heed_file(const char *path, const struct frf *frf, struct tune_result *io_result, struct error *out_error)
+{
+    static const char biased[] = "biased: ";
+    for (size_t i = 0; i < frf->key_count; i++) {
+        const char *key = frf->keys[i].key, *value = frf->keys[i].value;
+        if (strcmp(key, "warning") == 0 && strncmp(value, biased, sizeof biased - 1) == 0) {
+            return error_set(out_error, error_refused, "%s: its key warning says of the response: %.400s", path, value);
+        }
+        if (is_warning(key)) {
+            warn(io_result, "the response's file says (%.40s): %.450s", key, value);
+        } else if (strcmp(key, "clock") == 0 && strcmp(value, "apart") == 0) {
+            warn(io_result,
+                 "the response's file says (clock): input and output do not repeat after the same time; its phase "
+                 "drifts through the recording");
+        }
+    }
+    io_result->file_warning_count = io_result->warning_count;
+    return 0;
+}
+
+static void warn_about_lines(struct tune_result *io_result)
+{
+    const struct tune_plant *plant = &io_result->plant;
+    const struct nyquist *nyquist = &io_result->solution.nyquist;
+    const double last_hz = plant->frequency_hz[plant->count - 1];
+    const double last_gain_usual_db = -20.0, last_share_usual = 0.8;
+    char left_out[160];
+    size_t gaps = 0, gap = 0;
+    tune_plant_name_left_out(plant, 0.0, INFINITY, sizeof left_out, left_out);
+    if (left_out[0]) {
+        warn(io_result, "left out as not valid: %s", left_out);
+    }
+    for (size_t k = plant->count - 1; k-- > 0 && plant->frequency_hz[k] > io_result->margins.crossover_hz;) {
+        if (plant->frequency_hz[k + 1] > GAP_RATIO_MOST * plant->frequency_hz[k]) {
+            gaps++;
+            gap = k;
+        }
+    }
+    if (gaps > 0) {
+        warn(io_result,
+             "there is no line between %.4g and %.4g Hz%s, where the open loop is at %.0f and %.0f dB: no margin is "
+             "looked for there",
+             plant->frequency_hz[gap], plant->frequency_hz[gap + 1], gaps > 1 ? " and in gaps above" : "",
+             20.0 * log10(cabs(io_result->loop[gap])), 20.0 * log10(cabs(io_result->loop[gap + 1])));
+    }
+    if (nyquist->last_gain_db > last_gain_usual_db && last_hz < 0.5 * last_share_usual * plant->rate_hz) {
+        warn(io_result,
+             "the lines end at %.4g Hz, where the open loop is at %.1f dB: a resonance above that raises it by %.0f dB "
+             "may make it unstable unseen; lines up to near %.4g Hz would show it",
+             last_hz, nyquist->last_gain_db, -nyquist->last_gain_db, 0.5 * plant->rate_hz);
+    }
+}
+
+static void warn_about_hold(struct tune_result *io_result)
+{
+    const struct tune_plant *plant = &io_result->plant;
+    if (!(plant->response_rate_hz > 0.0)) {
+        warn(io_result,
+             "the response's file has no sample_rate_hz: its hold is taken for that of the controller at %.6g Hz",
+             plant->rate_hz);
+    }
+    if (plant->carried) {
+        warn(io_result,
+             "the response, measured %s%.6g Hz, is carried over to the controller's hold at %.6g Hz; what folding "
+             "leaves unknown is %.2g %% of it at the crossover",
+             plant->band_limited ? "band-limited at " : "with a hold at ", plant->response_rate_hz, plant->rate_hz,
+             100.0 * io_result->doubt_at_crossover);
+    }
+}
+
+/// The number in a column's name, as in torque_2_Nm; 0 if it has none.
+static long column_number(const char *name)
+{
+    for (const char *at = strchr(name, '_'); at; at = strchr(at + 1, '_')) {
+        char *end;
+        const long number = strtol(at + 1, &end, 10);
+        if (end > at + 1 && *end == '_' && isdigit((unsigned char)at[1])) {
+            return number;
+        }
+    }
+    return 0;
+}
+
 static void warn_about_data(const struct frf *frf, struct tune_result *io_result)
 {
     const struct tune_plant *plant = &io_result->plant;
@@ -200,19 +306,35 @@ static void warn_about_data(const struct frf *frf, struct tune_result *io_result
              "(frf --input with a _ref_ column has them, --loop-delay adds them)",
              frf->input);
     }
-    for (size_t i = 0; i < frf->key_count; i++) {
-        if (strcmp(frf->keys[i].key, "warning") == 0) {
-            warn(io_result, "the response's file warns: %.240s", frf->keys[i].value);
-        }
+    const long input = column_number(frf->input), output = column_number(frf->output);
+    if (input > 0) {
+        warn(io_result, "%s is one of several inputs: its loop is judged with those of the others open%s", frf->input,
+             output > 0 && output != input ? ", and the output is another one's" : "");
     }
     if (!plant->std_known) {
         warn(io_result, "the response has no standard deviations: what noise does to gains and margins is not known");
-    } else if (deviation->stable < tune_draws) {
+        return;
+    }
+    if (plant->std_unknown > 0) {
+        warn(io_result, "%zu of %zu lines have no standard deviation and count as exact", plant->std_unknown,
+             plant->count);
+    }
+    if (deviation->stable < tune_draws) {
         warn(io_result,
              "of %d responses drawn from the measured one and its standard deviation %zu are not shown to be stable "
              "with these gains",
              (int)tune_draws, tune_draws - deviation->stable);
     }
+}
+
+/// The plant's doubt, relative, at the line next above the crossover.
+static double find_doubt(const struct tune_plant *plant, double crossover_hz)
+{
+    size_t k = 0;
+    while (k + 1 < plant->count && plant->frequency_hz[k] < crossover_hz) {
+        k++;
+    }
+    return plant->doubt[k] / cabs(plant->response[k]);
 }
 
 // ---- All of it
@@ -232,6 +354,7 @@ static int finish(struct tune_result *io_result, struct error *out_error)
         io_result->reference[k] = tune_reference_at(&solution->reference, plant->frequency_hz[k]);
     }
     margins_find(plant->count, plant->frequency_hz, io_result->loop, &io_result->margins);
+    io_result->doubt_at_crossover = find_doubt(plant, io_result->margins.crossover_hz);
     return 0;
 }
 
@@ -263,6 +386,7 @@ int tune_run(const char *path, const struct frf *frf, const struct tune_options 
 {
     *out_result = (struct tune_result){.weighting = options->weighting};
     int status = tune_plant_take(path, frf, options->rate_hz, options->loop_delay_s, &out_result->plant, out_error);
+    status = status ? status : heed_file(path, frf, out_result, out_error);
     status = status ? status : find_solution(path, options, out_result, out_error);
     status = status ? status : finish(out_result, out_error);
     if (status) {
@@ -271,6 +395,8 @@ int tune_run(const char *path, const struct frf *frf, const struct tune_options 
     }
     warn_about_margins(out_result);
     warn_about_gains(out_result);
+    warn_about_lines(out_result);
+    warn_about_hold(out_result);
     warn_about_data(frf, out_result);
     return 0;
 }

@@ -14,7 +14,7 @@
 #include "lab/tune/reference.h"
 #include "lab/tune/resonance.h"
 
-enum { tune_warnings_max = 8, tune_warning_size = 320, tune_draws = 100 };
+enum { tune_warnings_max = 16, tune_warning_size = 560, tune_draws = 100 };
 
 struct tune_options {
     const char *structure; ///< name in tune_structures
@@ -56,6 +56,8 @@ struct tune_result {
     struct tune_deviation deviation;
     double complex *loop;      ///< K G on the plant's lines
     double complex *reference; ///< M there
+    double doubt_at_crossover; ///< the plant's doubt over its response there; 0: none
+    size_t file_warning_count; ///< the first ones: what the response's file itself warns of
     size_t warning_count;
     char warnings[tune_warnings_max][tune_warning_size];
 };
@@ -64,9 +66,9 @@ struct tune_result {
 void tune_options_default(struct tune_options *out_options);
 
 /// Tunes. `path` begins messages.
-/// Errors: error_usage: a name or number that cannot be; error_refused: the response cannot be used, has no resonance
-///         for a notch, the loop would be unstable or cannot be judged, with figures and what to try. *out_result is
-///         empty then.
+/// Errors: error_usage: a name or number that cannot be; error_refused: the response cannot be used, is biased by its
+///         own file's word, has no resonance for a notch, the loop would be unstable or cannot be judged, with figures
+///         and what to try. *out_result is empty then.
 /// Test:   tests/unit/test_tune.c, tests/golden/test_tune_reference.c
 int tune_run(const char *path, const struct frf *frf, const struct tune_options *options,
              struct tune_result *out_result, struct error *out_error);

@@ -98,6 +98,8 @@ static void add_stability(cJSON *root, const struct tune_result *result)
     cJSON_AddBoolToObject(object, "stable", nyquist->verdict == nyquist_stable);
     cJSON_AddNumberToObject(object, "lines", (double)result->plant.count);
     cJSON_AddNumberToObject(object, "lines_skipped", (double)result->plant.skipped);
+    cJSON_AddNumberToObject(object, "lines_not_valid", (double)result->plant.left_out);
+    cJSON_AddNumberToObject(object, "doubt_at_crossover", result->doubt_at_crossover);
     cJSON_AddNumberToObject(object, "first_hz", result->plant.frequency_hz[0]);
     cJSON_AddNumberToObject(object, "first_gain_db", nyquist->first_gain_db);
     cJSON_AddNumberToObject(object, "last_hz", result->plant.frequency_hz[result->plant.count - 1]);
@@ -137,6 +139,8 @@ cJSON *tune_json(const char *path, const struct tune_result *result)
     cJSON_AddStringToObject(root, "feedback", result->plant.output == tune_output_velocity ? "velocity" : "position");
     cJSON_AddStringToObject(root, "form", controller->structure->form);
     cJSON_AddNumberToObject(root, "sample_rate_hz", controller->rate_hz);
+    cJSON_AddNumberToObject(root, "response_rate_hz",
+                            result->plant.response_rate_hz > 0.0 ? result->plant.response_rate_hz : NAN);
     cJSON_AddNumberToObject(root, "loop_delay_s", result->plant.loop_delay_s);
     add_gains(root, result);
     add_filter(root, &controller->filter);

@@ -163,7 +163,7 @@ static void test_tune_gives_the_same_numbers_for_the_same_response(void)
 static void test_tune_refuses_an_unstable_loop_with_advice_that_holds(void)
 {
     const struct known_drive drive = rigid();
-    take(&drive);
+    frf = known_frf(&drive, 0.5, 0.5, 1800);
     options.bandwidth_hz = 60.0;
     options.delay_samples = 0.0;
     options.loop_delay_s = 0.02;
@@ -239,6 +239,8 @@ static void test_tune_refuses_options_out_of_range(void)
     options.structure = "pid";
     options.corner_hz = 901.0;
     refuses(error_usage, "--corner");
+    options.rate_hz = 1e12;
+    refuses(error_usage, "--rate: 1e+12 Hz, expected at most 1e+07 Hz");
 }
 
 static void test_tune_warns_of_what_the_engineer_should_know(void)
@@ -271,6 +273,122 @@ static void test_tune_warns_of_what_the_engineer_should_know(void)
     options.bandwidth_hz = 400.0;
     tune();
     TEST_ASSERT_TRUE(warns("max |S| is"));
+    tearDown();
+
+    take(&belt);
+    options.structure = "pi";
+    options.bandwidth_hz = 500.0; // this reference has no -3 dB below half the rate
+    tune();
+    TEST_ASSERT_TRUE(warns("cannot reach the reference"));
+}
+
+static void add_key(const char *key, const char *value)
+{
+    frf.keys = realloc(frf.keys, (frf.key_count + 1) * sizeof *frf.keys);
+    TEST_ASSERT_NOT_NULL(frf.keys);
+    frf.keys[frf.key_count] = (struct run_key){0};
+    TEST_ASSERT_TRUE(frf_set_text(&frf.keys[frf.key_count].key, key) &&
+                     frf_set_text(&frf.keys[frf.key_count].value, value));
+    frf.key_count++;
+}
+
+/// Whatever the file says against itself comes first; one that covers nothing is told at the end, without a guess.
+static void test_tune_says_what_the_file_warns_of(void)
+{
+    static const char *const keys[][2] = {{"parametric_warning", "more dynamics than the model has"},
+                                          {"warning", "biased if a loop is closed"},
+                                          {"warning_of_the_future", "something else"},
+                                          {"clock", "apart"}};
+    const struct known_drive drive = rigid();
+    take(&drive);
+    for (size_t i = 0; i < 4; i++)
+        add_key(keys[i][0], keys[i][1]);
+    add_key("no_warnings", "this is none");
+    tune();
+    TEST_ASSERT_EQUAL_size_t(4, result.file_warning_count);
+    for (size_t i = 0; i < 4; i++)
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(result.warnings[i], keys[i][0]), result.warnings[i]);
+    TEST_ASSERT_TRUE(warns("more dynamics than the model has") && !warns("this is none"));
+}
+
+/// A response drawn towards minus the inverse of the controller is not tuned on; one that another input answers is, as
+/// far as that leaves a verdict.
+static void test_tune_refuses_on_what_the_file_warns_of(void)
+{
+    const struct known_drive drive = rigid();
+    take(&drive);
+    add_key("warning", "biased: the recording holds velocity_ref_rad_per_s; use method indirect");
+    refuses(error_refused, "its key warning says of the response: biased: the recording holds");
+    tearDown();
+
+    take(&drive);
+    add_key("other_inputs_db", "-26");
+    add_key("warning_inputs", "it answers");
+    tune();
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.05, result.doubt_at_crossover);
+    tearDown();
+
+    take(&drive);
+    add_key("other_inputs_db", "1");
+    add_key("warning_inputs", "it answers");
+    refuses(error_refused, "another input is up to 1.1 times as strong on a line");
+    tearDown();
+
+    take(&drive);
+    add_key("repetition_level", "0.9");
+    add_key("warning_repetition", "every second period");
+    refuses(error_refused, "0.9 of the response does not repeat");
+}
+
+static void test_tune_says_what_its_lines_leave_open(void)
+{
+    const struct known_drive drive = rigid();
+    frf = known_frf(&drive, 1.0, 1.0, 300);
+    for (size_t k = 48; k < 51; k++)
+        frf.valid[k] = false;
+    tune();
+    TEST_ASSERT_TRUE(warns("left out as not valid: 3 lines at 49..51 Hz"));
+    TEST_ASSERT_TRUE(warns("the lines end at 300 Hz"));
+    tearDown();
+
+    frf = known_frf(&drive, 1.0, 1.0, 950);
+    for (size_t k = 0; k < frf.count; k++)
+        frf.valid[k] = !(frf.frequency_hz[k] > 400.0 && frf.frequency_hz[k] < 700.0);
+    options.bandwidth_hz = 5.0;
+    tune();
+    TEST_ASSERT_TRUE(warns("there is no line between 400 and 700 Hz"));
+    TEST_ASSERT_FALSE(warns("the lines end"));
+}
+
+static void test_tune_says_that_it_carried_the_response_over(void)
+{
+    const struct known_drive drive = rigid();
+    frf = known_frf(&drive, 1.0, 1.0, 999);
+    options.rate_hz = 1000.0;
+    tune();
+    TEST_ASSERT_TRUE(warns("measured with a hold at 2000 Hz, is carried over to the controller's hold at 1000 Hz"));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, result.doubt_at_crossover);
+    tearDown();
+    frf = known_frf(&drive, 1.0, 1.0, 999);
+    frf.key_count = 0; // no rate
+    options.rate_hz = 2000.0;
+    tune();
+    TEST_ASSERT_TRUE(warns("no sample_rate_hz"));
+    TEST_ASSERT_FALSE(warns("carried over"));
+    frf.key_count = 1;
+}
+
+static void test_tune_warns_of_several_inputs_and_of_missing_standard_deviations(void)
+{
+    const struct known_drive drive = rigid();
+    take(&drive);
+    add_noise(0.001, 1);
+    frf.std[7] = FRF_UNKNOWN;
+    TEST_ASSERT_TRUE(frf_set_text(&frf.input, "torque_ref_2_Nm") && frf_set_text(&frf.output, "velocity_1_rad_per_s"));
+    tune();
+    TEST_ASSERT_TRUE(warns("torque_ref_2_Nm is one of several inputs"));
+    TEST_ASSERT_TRUE(warns("the output is another one's"));
+    TEST_ASSERT_TRUE(warns("1 of 450 lines have no standard deviation"));
 }
 
 /// The model file's controller adds its integral one sample later: K = gain (1 + q/(1 - q) Ts/Ti) has to be the same.
@@ -312,7 +430,8 @@ static void test_tune_json_and_page_hold_no_number_that_is_none(void)
     fclose(stream);
     const char *body = strstr(text, "<main>");
     TEST_ASSERT_NOT_NULL(body);
-    TEST_ASSERT_NULL(strstr(body, "nan"));
+    TEST_ASSERT_NULL(strstr(body, ">nan"));
+    TEST_ASSERT_NULL(strstr(body, " nan"));
     TEST_ASSERT_NULL(strstr(body, ">inf"));
     TEST_ASSERT_NOT_NULL(strstr(body, "Nyquist plot"));
     free(text);
@@ -335,6 +454,11 @@ int main(void)
     RUN_TEST(test_tune_gives_the_linear_fit_where_reweighting_is_worse);
     RUN_TEST(test_tune_refuses_options_out_of_range);
     RUN_TEST(test_tune_warns_of_what_the_engineer_should_know);
+    RUN_TEST(test_tune_says_what_the_file_warns_of);
+    RUN_TEST(test_tune_refuses_on_what_the_file_warns_of);
+    RUN_TEST(test_tune_says_what_its_lines_leave_open);
+    RUN_TEST(test_tune_says_that_it_carried_the_response_over);
+    RUN_TEST(test_tune_warns_of_several_inputs_and_of_missing_standard_deviations);
     RUN_TEST(test_tune_gives_the_controller_in_the_terms_of_a_model_file);
     RUN_TEST(test_tune_json_and_page_hold_no_number_that_is_none);
     return UNITY_END();

@@ -4,6 +4,7 @@
 #include "unity.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 
 enum { lines = 4000 };
@@ -78,6 +79,30 @@ static void test_tune_margins_of_a_loop_that_needs_its_gain(void)
     TEST_ASSERT_TRUE(isnan(margins.gain_db));
 }
 
+/// L = 20 Hz/(j f) exp(-j w T) crosses 1 at 20 Hz and -180 degrees at 62.5 Hz: where lines are missing there, nothing
+/// is drawn across.
+static void test_tune_margins_are_not_interpolated_across_a_gap(void)
+{
+    static const struct {
+        double low_hz, high_hz;
+        bool crossover, gain;
+    } cases[] = {{15.0, 25.0, false, true}, {16.0, 24.0, true, true}, {50.0, 90.0, true, false}};
+    const double delay_s = 0.004;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        size_t count = 0;
+        for (double f = 5.0; f < 150.0; f *= 1.01) {
+            if (f > cases[i].low_hz && f < cases[i].high_hz)
+                continue;
+            frequency_hz[count] = f;
+            loop[count++] = 20.0 / (I * f) * cexp(-I * two_pi * f * delay_s);
+        }
+        margins_find(count, frequency_hz, loop, &margins);
+        TEST_ASSERT_EQUAL(cases[i].crossover, !isnan(margins.crossover_hz));
+        TEST_ASSERT_EQUAL(cases[i].crossover, !isnan(margins.phase_deg));
+        TEST_ASSERT_EQUAL(cases[i].gain, !isnan(margins.gain_db));
+    }
+}
+
 /// Nothing crosses on these lines: numbers that are not there are not made up.
 static void test_tune_margins_are_unknown_where_lines_do_not_show_them(void)
 {
@@ -93,6 +118,7 @@ int main(void)
     RUN_TEST(test_tune_margins_of_an_integrator_with_delay);
     RUN_TEST(test_tune_margins_of_an_integrator);
     RUN_TEST(test_tune_margins_of_a_loop_that_needs_its_gain);
+    RUN_TEST(test_tune_margins_are_not_interpolated_across_a_gap);
     RUN_TEST(test_tune_margins_are_unknown_where_lines_do_not_show_them);
     return UNITY_END();
 }

@@ -192,6 +192,132 @@ static void test_tune_nyquist_takes_an_antiresonance_between_lines(void)
     TEST_ASSERT_TRUE(known_worst_pole(&drive, 0.003 * known_two_pi * 60.0, 1.0) < 1.0);
 }
 
+/// A hole in the lines, around the resonance as often as not.
+static void make_hole(const struct known_drive *drive, struct random *random)
+{
+    size_t peak = 1;
+    for (size_t k = 2; k + 1 < frf.count; k++) {
+        const double complex G = frf.real[k] + frf.imag[k] * I, P = frf.real[peak] + frf.imag[peak] * I;
+        peak = frf.frequency_hz[k] * cabs(G) > frf.frequency_hz[peak] * cabs(P) ? k : peak;
+    }
+    const bool around = drive->order > 1 && random_uniform(random) < 0.7;
+    const double low = around ? frf.frequency_hz[peak] * uniform(random, 0.4, 0.95) : spread(random, 5.0, 300.0);
+    const double high = around ? frf.frequency_hz[peak] * uniform(random, 1.05, 2.0) : low * uniform(random, 1.1, 4.0);
+    for (size_t k = 0; k < frf.count; k++)
+        frf.valid[k] = !(frf.frequency_hz[k] > low && frf.frequency_hz[k] < high);
+}
+
+/// No loop is certified that a resonance in a hole makes unstable. Without the look into gaps some would be.
+static void test_tune_nyquist_certifies_no_unstable_loop_across_a_hole(void)
+{
+    enum { holes = 800, fooled_least = 10, stable_least = 40 };
+    struct random random;
+    struct error error;
+    size_t fooled = 0, stable = 0, refused = 0;
+    random_seed(&random, campaign_seed);
+    for (int h = 0; h < holes; h++) {
+        const struct known_drive drive = draw_drive(&random);
+        frf = known_frf(&drive, 1.0, 1.0, 990);
+        make_hole(&drive, &random);
+        TEST_ASSERT_EQUAL_INT(0, tune_plant_take("frf.csv", &frf, 0.0, 0.0, &plant, &error));
+        loop = calloc(plant.count, sizeof *loop);
+        const double inertia = 1.0 / cabs(plant.response[0]) / (known_two_pi * plant.frequency_hz[0]);
+        const double crossover = known_two_pi * spread(&random, 5.0, 200.0);
+        const double Kp = crossover * inertia, Ki = Kp * crossover * spread(&random, 1e-3, 0.5);
+        const bool is_stable = known_worst_pole(&drive, Kp, Ki) < 1.0;
+        const struct nyquist judged = judge(Kp, Ki);
+        struct nyquist lines;
+        nyquist_judge(&plant, plant.response, loop, &controller, false, &lines);
+        char which[sizeof judged.reason + 100];
+        snprintf(which, sizeof which, "seed %d, hole %d: Kp %.6g Ki %.6g", (int)campaign_seed, h, Kp, Ki);
+        TEST_ASSERT_TRUE_MESSAGE(is_stable || judged.verdict != nyquist_stable, which);
+        fooled += !is_stable && lines.verdict == nyquist_stable;
+        stable += judged.verdict == nyquist_stable;
+        refused += judged.verdict == nyquist_undecided;
+        tearDown();
+    }
+    printf("of %d drives with a hole in their lines: %zu judged stable, %zu refused; %zu unstable ones that the lines "
+           "alone would have passed\n",
+           (int)holes, stable, refused, fooled);
+    TEST_ASSERT_TRUE(fooled >= fooled_least && stable >= stable_least);
+}
+
+static void test_tune_nyquist_names_the_gap_and_the_lines_left_out(void)
+{
+    const struct known_drive drive = known_rigid(2000.0, 1, 0.005, 0.01);
+    struct error error;
+    frf = known_frf(&drive, 0.5, 0.5, 1800);
+    for (size_t k = 0; k < frf.count; k++)
+        frf.valid[k] = !(frf.frequency_hz[k] > 17.5 && frf.frequency_hz[k] < 50.5);
+    TEST_ASSERT_EQUAL_INT(0, tune_plant_take("frf.csv", &frf, 0.0, 0.0, &plant, &error));
+    loop = calloc(plant.count, sizeof *loop);
+    refuses(0.005 * known_two_pi * 10.0, 0.1,
+            "expected lines between 17.5 and 50.5 Hz (65 lines at 18..50 Hz not valid)");
+    refuses(0.005 * known_two_pi * 30.0, 0.1, "between the lines at 17.5 and 50.5 Hz"); // the crossover is in it
+    tearDown();
+    frf = known_frf(&drive, 0.5, 0.5, 1800);
+    for (size_t k = 0; k < frf.count; k++)
+        frf.valid[k] = !(frf.frequency_hz[k] > 200.0 && frf.frequency_hz[k] < 600.0);
+    TEST_ASSERT_EQUAL_INT(0, tune_plant_take("frf.csv", &frf, 0.0, 0.0, &plant, &error));
+    loop = calloc(plant.count, sizeof *loop);
+    TEST_ASSERT_EQUAL_INT(nyquist_stable, judge(0.005 * known_two_pi * 6.0, 0.1).verdict); // 30 dB below
+    refuses(0.005 * known_two_pi * 20.0, 0.1, "between the lines at 200 and 600 Hz");      // 20 dB
+}
+
+/// Grids as they are used, with a line missing here and there.
+static void test_tune_nyquist_takes_usual_grids(void)
+{
+    static const struct {
+        const char *name;
+        double first_hz, step_hz, ratio;
+    } grids[] = {{"linear", 1.0, 1.0, 0.0},        {"odd", 1.0, 2.0, 0.0},         {"half", 0.5, 0.5, 0.0},
+                 {"quasi-log 1.05", 1.0, 0, 1.05}, {"quasi-log 1.1", 1.0, 0, 1.1}, {"quasi-log 1.2", 1.0, 0, 1.2},
+                 {"quasi-log 1.3", 1.0, 0, 1.3},   {"coarse", 2.0, 4.0, 0.0}};
+    const struct known_drive drive = known_rigid(2000.0, 2, 0.005, 0.01);
+    for (size_t g = 0; g < sizeof grids / sizeof *grids; g++)
+        for (int missing = 0; missing < 2; missing++) {
+            struct error error;
+            double f = grids[g].first_hz;
+            size_t n = 0;
+            frf = known_frf(&drive, 1.0, 1.0, 2000);
+            while (f < 900.0) {
+                const double complex G = known_response(&drive, cexp(-I * known_two_pi * f / drive.rate_hz));
+                frf.frequency_hz[n] = f;
+                frf.real[n] = creal(G);
+                frf.imag[n] = cimag(G);
+                frf.valid[n] = !(missing && grids[g].ratio < 1.2 && n % 13 == 10);
+                f = grids[g].ratio > 0.0 ? f * grids[g].ratio : f + grids[g].step_hz;
+                n++;
+            }
+            frf.count = n;
+            TEST_ASSERT_EQUAL_INT(0, tune_plant_take("frf.csv", &frf, 0.0, 0.0, &plant, &error));
+            loop = calloc(plant.count, sizeof *loop);
+            for (double crossover = 15.0; crossover < 100.0; crossover *= 1.3) {
+                const double Kp = 0.005 * known_two_pi * crossover;
+                const struct nyquist nyquist = judge(Kp, 0.2 * Kp * crossover);
+                char which[sizeof nyquist.reason + 80];
+                snprintf(which, sizeof which, "%s, crossover %.3g Hz: %s", grids[g].name, crossover, nyquist.reason);
+                TEST_ASSERT_EQUAL_INT_MESSAGE(nyquist_stable, nyquist.verdict, which);
+            }
+            frf.count = 2000;
+            tearDown();
+        }
+}
+
+/// What the file says of itself is believed: -1 within it is undecided, for that reason.
+static void test_tune_nyquist_refuses_where_doubt_decides(void)
+{
+    const struct known_drive drive = known_rigid(2000.0, 1, 0.005, 0.01);
+    take(&drive, 1.0, 1.0, 900);
+    snprintf(plant.doubt_from, sizeof plant.doubt_from, "another input answers");
+    for (size_t k = 0; k < plant.count; k++)
+        plant.doubt[k] = 0.05 * cabs(plant.response[k]);
+    TEST_ASSERT_EQUAL_INT(nyquist_stable, judge(0.005 * known_two_pi * 60.0, 1.0).verdict);
+    for (size_t k = 0; k < plant.count; k++)
+        plant.doubt[k] = 1.2 * cabs(plant.response[k]);
+    refuses(0.005 * known_two_pi * 60.0, 1.0, "only: another input answers");
+}
+
 static void test_tune_nyquist_takes_a_position_response(void)
 {
     // The integral of a rigid body's velocity: phase from -90 degrees with friction on to -180 and beyond.
@@ -211,6 +337,13 @@ static void test_tune_nyquist_takes_a_position_response(void)
         nyquist_judge(&plant, plant.response, loop, &controller, true, &nyquist);
         TEST_ASSERT_EQUAL_INT_MESSAGE(with_lead ? nyquist_stable : nyquist_unstable, nyquist.verdict, nyquist.reason);
     }
+    controller.gain[0] = 0.0; // a derivative alone: a pole at 1, and the position drifts
+    controller.gain[1] = 1.0;
+    for (size_t k = 0; k < plant.count; k++)
+        loop[k] = tune_controller_at(&controller, plant.delay[k]) * plant.response[k];
+    nyquist_judge(&plant, plant.response, loop, &controller, true, &nyquist);
+    TEST_ASSERT_EQUAL_INT(nyquist_undecided, nyquist.verdict);
+    TEST_ASSERT_NOT_NULL(strstr(nyquist.reason, "nothing holds the position"));
 }
 
 int main(void)
@@ -225,6 +358,10 @@ int main(void)
     RUN_TEST(test_tune_nyquist_refuses_a_wrong_sign);
     RUN_TEST(test_tune_nyquist_refuses_where_noise_decides);
     RUN_TEST(test_tune_nyquist_takes_an_antiresonance_between_lines);
+    RUN_TEST(test_tune_nyquist_certifies_no_unstable_loop_across_a_hole);
+    RUN_TEST(test_tune_nyquist_names_the_gap_and_the_lines_left_out);
+    RUN_TEST(test_tune_nyquist_takes_usual_grids);
+    RUN_TEST(test_tune_nyquist_refuses_where_doubt_decides);
     RUN_TEST(test_tune_nyquist_takes_a_position_response);
     return UNITY_END();
 }

@@ -14,7 +14,7 @@ static struct error error;
 void setUp(void)
 {
     const struct known_drive drive = known_rigid(2000.0, 1, 0.005, 0.01);
-    frf = known_frf(&drive, 0.0, 10.0, 120); // 0 .. 1190 Hz, half the rate is 1000 Hz
+    frf = known_frf(&drive, 0.0, 10.0, 101); // 0 .. 1000 Hz, half the rate
 }
 
 void tearDown(void)
@@ -35,9 +35,11 @@ static void test_tune_plant_leaves_out_lines_that_cannot_be_used(void)
     frf.valid[5] = false;
     frf.real[7] = frf.imag[7] = 0.0;
     TEST_ASSERT_EQUAL_INT(0, tune_plant_take("f.csv", &frf, 0.0, 0.0, &plant, &error));
-    // Of 120 lines 0 Hz, 20 from 1000 Hz on, one not valid, one without a response.
+    // Of 101 lines 0 Hz, 1000 Hz, one not valid, one without a response.
     TEST_ASSERT_EQUAL_size_t(97, plant.count);
-    TEST_ASSERT_EQUAL_size_t(23, plant.skipped);
+    TEST_ASSERT_EQUAL_size_t(4, plant.skipped);
+    TEST_ASSERT_EQUAL_size_t(2, plant.left_out);
+    TEST_ASSERT_EQUAL_DOUBLE(50.0, plant.left_out_hz[0]);
     TEST_ASSERT_EQUAL_DOUBLE(2000.0, plant.rate_hz);
     TEST_ASSERT_EQUAL_DOUBLE(10.0, plant.frequency_hz[0]);
     TEST_ASSERT_EQUAL_DOUBLE(990.0, plant.frequency_hz[96]);
@@ -53,6 +55,7 @@ static void test_tune_plant_takes_standard_deviations_and_their_confidence(void)
     TEST_ASSERT_TRUE(plant.std_known);
     TEST_ASSERT_EQUAL_DOUBLE(0.25, plant.std[2]);
     TEST_ASSERT_EQUAL_DOUBLE(0.0, plant.std[3]);
+    TEST_ASSERT_EQUAL_size_t(plant.count - 1, plant.std_unknown);
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, factor_of_ten_periods, plant.confidence_factor);
 }
 
@@ -80,7 +83,75 @@ static void test_tune_plant_rate_of_the_option_goes_before_the_file(void)
 {
     TEST_ASSERT_EQUAL_INT(0, tune_plant_take("f.csv", &frf, 4000.0, 0.0, &plant, &error));
     TEST_ASSERT_EQUAL_DOUBLE(4000.0, plant.rate_hz);
-    TEST_ASSERT_EQUAL_size_t(119, plant.count);
+    TEST_ASSERT_EQUAL_DOUBLE(2000.0, plant.response_rate_hz);
+    TEST_ASSERT_TRUE(plant.carried);
+    TEST_ASSERT_EQUAL_size_t(100, plant.count);
+}
+
+static void test_tune_plant_names_stretches_of_lines_left_out(void)
+{
+    char text[120];
+    TEST_ASSERT_EQUAL_INT(0, tune_plant_take("f.csv", &frf, 0.0, 0.0, &plant, &error));
+    tune_plant_name_left_out(&plant, 0.0, INFINITY, sizeof text, text);
+    TEST_ASSERT_EQUAL_STRING("", text);
+    tune_plant_free(&plant);
+    static const size_t lines[] = {5, 10, 11, 12, 20, 22, 30, 40};
+    for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
+        frf.valid[lines[i]] = false;
+    TEST_ASSERT_EQUAL_INT(0, tune_plant_take("f.csv", &frf, 0.0, 0.0, &plant, &error));
+    tune_plant_name_left_out(&plant, 0.0, 210.0, sizeof text, text);
+    TEST_ASSERT_EQUAL_STRING("5 lines at 50, 100..120, 200 Hz", text);
+    tune_plant_name_left_out(&plant, 50.0, 110.0, sizeof text, text);
+    TEST_ASSERT_EQUAL_STRING("1 line at 100 Hz", text);
+    tune_plant_name_left_out(&plant, 0.0, INFINITY, sizeof text, text);
+    TEST_ASSERT_EQUAL_STRING("8 lines at 50, 100..120, 200, 220 Hz and elsewhere", text);
+    char cut[12];
+    tune_plant_name_left_out(&plant, 0.0, INFINITY, sizeof cut, cut);
+    TEST_ASSERT_EQUAL_STRING("8 lines at ", cut);
+}
+
+static void set_keys(const char *const (*keys)[2], size_t count)
+{
+    for (size_t i = 0; i < frf.key_count; i++) {
+        free(frf.keys[i].key);
+        free(frf.keys[i].value);
+    }
+    free(frf.keys);
+    frf.keys = calloc(count, sizeof *frf.keys);
+    frf.key_count = count;
+    for (size_t i = 0; i < count; i++)
+        TEST_ASSERT_TRUE(frf_set_text(&frf.keys[i].key, keys[i][0]) && frf_set_text(&frf.keys[i].value, keys[i][1]));
+}
+
+/// A figure that the file warns with is doubt of that size, the two together; without the warning it is none.
+static void test_tune_plant_takes_the_figures_of_warnings_as_doubt(void)
+{
+    static const char *const keys[][2] = {{"sample_rate_hz", "2000"},
+                                          {"other_inputs_db", "-20"},
+                                          {"warning_inputs", "another"},
+                                          {"repetition_level", "0.05"},
+                                          {"warning_repetition", "late"}};
+    static const struct {
+        size_t keys;
+        double share;
+    } cases[] = {{2, 0.0}, {3, 0.1}, {4, 0.1}, {5, 0.15}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        set_keys(keys, cases[i].keys);
+        TEST_ASSERT_EQUAL_INT(0, tune_plant_take("f.csv", &frf, 0.0, 0.0, &plant, &error));
+        for (size_t k = 0; k < plant.count; k++)
+            TEST_ASSERT_DOUBLE_WITHIN(1e-12, cases[i].share, plant.doubt[k] / cabs(plant.response[k]));
+        TEST_ASSERT_EQUAL(cases[i].share > 0.0, plant.doubt_from[0] != '\0');
+        tune_plant_free(&plant);
+    }
+    TEST_ASSERT_TRUE(frf_set_text(&frf.keys[1].value, "much"));
+    refuses(error_refused, "other_inputs_db: 'much', expected a number of decibel");
+}
+
+static void test_tune_plant_refuses_frequencies_beyond_half_the_rate(void)
+{
+    for (size_t k = 0; k < frf.count; k++)
+        frf.frequency_hz[k] *= known_two_pi;
+    refuses(error_refused, "a line at 6283.19 Hz, expected at most 1000 Hz");
 }
 
 static void test_tune_plant_names_units(void)
@@ -142,7 +213,7 @@ static void test_tune_plant_refuses_too_few_lines(void)
 {
     for (size_t k = 8; k < frf.count; k++)
         frf.valid[k] = false;
-    refuses(error_refused, "7 of 120 lines are valid");
+    refuses(error_refused, "7 of 101 lines are valid");
 }
 
 int main(void)
@@ -153,6 +224,9 @@ int main(void)
     RUN_TEST(test_tune_plant_adds_the_loops_delay);
     RUN_TEST(test_tune_plant_puts_a_removed_delay_back);
     RUN_TEST(test_tune_plant_rate_of_the_option_goes_before_the_file);
+    RUN_TEST(test_tune_plant_names_stretches_of_lines_left_out);
+    RUN_TEST(test_tune_plant_takes_the_figures_of_warnings_as_doubt);
+    RUN_TEST(test_tune_plant_refuses_frequencies_beyond_half_the_rate);
     RUN_TEST(test_tune_plant_names_units);
     RUN_TEST(test_tune_plant_refuses_other_quantities);
     RUN_TEST(test_tune_plant_refuses_a_rate_that_is_none);

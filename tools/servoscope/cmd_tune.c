@@ -106,28 +106,45 @@ static int read_options(int argc, char **argv, struct arguments *out, struct err
     return status ? status : read_filter(out, &out->tune.filter, out_error);
 }
 
+static void print_margin(const struct say_margin *margin)
+{
+    if (!isfinite(margin->value)) {
+        printf("%s: %s", margin->name, margin->none);
+        return;
+    }
+    printf("%s %.4g%s%s", margin->name, margin->value, margin->unit[0] ? " " : "", margin->unit);
+    if (isfinite(margin->std)) {
+        printf(" +- %.2g", margin->std);
+    }
+    if (isfinite(margin->at_hz)) {
+        printf(" at %.4g Hz", margin->at_hz);
+    }
+}
+
 static void print_margins(const struct tune_result *result)
 {
+    enum { per_line = 2 };
     struct say_margin margins[say_margins_max];
     const size_t count = say_margins(result, margins);
-    const char *separator = "  ";
+    size_t printed = 0;
     for (size_t i = 0; i < count; i++) {
         const struct say_margin *m = &margins[i];
         const bool repeats =
             m->value == result->margins.last_cutoff_hz && m->value == result->margins.cutoff_hz && i + 1 == count;
-        if (!isfinite(m->value) || repeats) {
-            continue;
+        if ((isfinite(m->value) || m->none) && !repeats) {
+            printf("%s", printed == 0 ? "  " : printed % per_line ? "; " : "\n  ");
+            print_margin(m);
+            printed++;
         }
-        printf("%s%s %.4g%s%s", separator, m->name, m->value, m->unit[0] ? " " : "", m->unit);
-        if (isfinite(m->std)) {
-            printf(" +- %.2g", m->std);
-        }
-        if (isfinite(m->at_hz)) {
-            printf(" at %.4g Hz", m->at_hz);
-        }
-        separator = i % 2 ? "\n  " : "; ";
     }
     putchar('\n');
+}
+
+static void print_warnings(const struct tune_result *result, size_t first, size_t end)
+{
+    for (size_t i = first; i < end; i++) {
+        printf("  mind: %s\n", result->warnings[i]);
+    }
 }
 
 static void print_summary(const char *path, const struct frf *frf, const struct tune_result *result)
@@ -143,6 +160,7 @@ static void print_summary(const char *path, const struct frf *frf, const struct 
         printf(" (-3 dB at %.4g Hz)", reference_hz);
     }
     putchar('\n');
+    print_warnings(result, 0, result->file_warning_count);
     for (size_t i = 0; i < controller->structure->gains; i++) {
         say_gain(result, i, "+-", text);
         printf("  %s = %s\n", tune_term_symbol(controller->structure->terms[i]), text);
@@ -160,9 +178,11 @@ static void print_summary(const char *path, const struct frf *frf, const struct 
            result->plant.count, result->plant.frequency_hz[0], result->plant.frequency_hz[result->plant.count - 1],
            solution->nyquist.first_gain_db, solution->nyquist.last_gain_db);
     print_margins(result);
-    for (size_t i = 0; i < result->warning_count; i++) {
-        printf("  mind: %s\n", result->warnings[i]);
+    if (result->resonance.found) {
+        printf("  resonance of the drive at %.4g Hz, damping %.3g, %.3g dB high\n", result->resonance.frequency_hz,
+               result->resonance.damping, result->resonance.prominence_db);
     }
+    print_warnings(result, result->file_warning_count, result->warning_count);
 }
 
 static int write_page(const struct arguments *arguments, const struct frf *frf, const struct tune_result *result,
@@ -238,7 +258,9 @@ const struct command command_cmd_tune = {
         "  --controller NAME    p, pi (default), pid, lead, pi+notch or pi+biquad\n"
         "  --damping D          of the closed loop that is asked for (default 0.9)\n"
         "  --delay SAMPLES      delay that it may have (default 1)\n"
-        "  --rate HZ            of the controller (default: the file's sample_rate_hz)\n"
+        "  --rate HZ            of the controller (default: the file's sample_rate_hz); at another rate the response "
+        "is carried over\n"
+        "                       to the controller's hold\n"
         "  --loop-delay S       delay of the loop that the response does not contain (default 0)\n"
         "  --weighting log      each octave counts the same (default); flat: each Hz\n"
         "  --corner HZ          of the derivative's filter (default: 10 times the bandwidth, of lead 3 times)\n"
@@ -253,7 +275,10 @@ const struct command command_cmd_tune = {
         "cannot tell, end\n"
         "with status 1 and what to try. A response from torque to velocity gives Kp in Nm s/rad and Ki in Nm/rad; one "
         "to position\n"
-        "takes pid or lead. Lines that are not valid are left out.\n"
+        "takes pid or lead. Lines that are not valid are left out. Where lines are so far apart that a resonance may "
+        "hide "
+        "between them and\n"
+        "reach -1, the gap is named and nothing is given out.\n"
         "\n"
         "example:\n"
         "  servoscope tune frf.csv --bandwidth 30 --out tune.json --report tune.html\n",
