@@ -1,18 +1,30 @@
 /* SPDX-License-Identifier: MIT */
 #include "sim/belt_drive.h"
 
+#include "sim/effect.h"
 #include "sim/random.h"
 
 #include <math.h>
 #include <string.h>
 
+/// The model may change between samples: a bus sets its own rate.
+static void prepare(struct sim_belt_drive *self)
+{
+    // Padding that differs would only prepare it once more.
+    if (memcmp(&self->stepper.model, self->model, sizeof *self->model) != 0)
+        sim_stepper_init(&self->stepper, self->model, 1.0 / (self->model->sample_rate_hz * sim_substeps));
+}
+
 void sim_belt_drive_init(struct sim_belt_drive *self, const struct sim_model *model, double position)
 {
+    const uint64_t record_stream = 0x7265636f7264; // any number that sets it apart from the noise's
     memset(self, 0, sizeof *self);
     self->model = model;
+    prepare(self);
     sim_plant_init(&self->plant, position);
     sim_actuator_init(&self->actuator);
     sim_random_seed(self->random, model->seed);
+    sim_random_seed(self->record_random, model->seed ^ record_stream);
     self->torque_limit = INFINITY;
     self->stop_deceleration = 50.0;
 }
@@ -114,20 +126,52 @@ static void hold_at_end_stops(struct sim_belt_drive *self)
     self->hit_end_stop = true;
 }
 
+static void sense(struct sim_belt_drive *self, const struct noise *noise, struct sim_sample *out_sample)
+{
+    const struct sim_model *model = self->model;
+    struct sim_motion motion = {.position = self->plant.position,
+                                .velocity = self->plant.velocity,
+                                .time_s = self->plant.time_s,
+                                .linear = model->linear};
+    struct sim_sensed sensed;
+    sim_stepper_sense(&self->stepper, &motion, &sensed);
+    out_sample->position = quantised(model, sensed.position + noise->position);
+    out_sample->velocity = filtered_velocity(self, sensed.velocity + noise->velocity);
+    out_sample->load_position = quantised(model, self->plant.load_position + noise->load_position);
+}
+
+/// Rows that the recording lost repeat the one before, but for the reference.
+static void lose_rows(struct sim_belt_drive *self, struct sim_sample *io_sample)
+{
+    bool lost = false;
+    for (size_t i = 0; i < self->stepper.lose.count; i++) {
+        size_t e = self->stepper.lose.effects[i];
+        double uniform = sim_random_uniform(self->record_random);
+        lost = sim_effects[e]->lose(self->model->effect_parameters[e], uniform) || lost;
+    }
+    if (lost && self->has_last) {
+        double torque_ref = io_sample->torque_ref;
+        *io_sample = self->last;
+        io_sample->torque_ref = torque_ref;
+    }
+    self->last = *io_sample;
+    self->has_last = true;
+}
+
 void sim_belt_drive_step(struct sim_belt_drive *self, const struct sim_command *command, struct sim_sample *out_sample)
 {
     const struct sim_model *model = self->model;
     struct noise noise = draw_noise(self);
-    out_sample->position = quantised(model, self->plant.position + noise.position);
-    out_sample->velocity = filtered_velocity(self, self->plant.velocity + noise.velocity);
-    out_sample->load_position = quantised(model, self->plant.load_position + noise.load_position);
+    prepare(self);
+    sense(self, &noise, out_sample);
     out_sample->torque_ref = control(self, command, out_sample->position, out_sample->velocity);
     sim_actuator_hold(&self->actuator, out_sample->torque_ref);
-    out_sample->torque = sim_actuator_now(&self->actuator, model) + noise.torque;
+    out_sample->torque = sim_actuator_now(&self->actuator, &self->stepper) + noise.torque;
     for (size_t i = 0; i < sim_substeps; i++) {
-        double torque = sim_actuator_substep(&self->actuator, model, i) + noise.process;
-        sim_plant_step(&self->plant, model, torque, 1.0 / (model->sample_rate_hz * sim_substeps));
+        double torque = sim_actuator_substep(&self->actuator, &self->stepper, i) + noise.process;
+        sim_plant_move(&self->plant, &self->stepper, torque);
         if (model->has_end_stops)
             hold_at_end_stops(self);
     }
+    lose_rows(self, out_sample);
 }

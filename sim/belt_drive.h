@@ -34,9 +34,13 @@ struct sim_sample {
 
 struct sim_belt_drive {
     const struct sim_model *model;
+    struct sim_stepper stepper; ///< of the model as it was when a sample last began
     struct sim_plant plant;
     struct sim_actuator actuator;
     uint64_t random[4];
+    uint64_t record_random[4]; ///< what befalls the record has numbers of its own: noise stays the same
+    struct sim_sample last;    ///< what was recorded last
+    bool has_last;
     double velocity_integral; ///< of the velocity controller, Nm
     double velocity_filtered; ///< state of the speed signal's filter
     double stop_velocity;     ///< set-point of the quick-stop ramp

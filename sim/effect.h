@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { sim_effect_parameters_max = 4, sim_effect_scan_max = 16, sim_effects_max = 24 };
+enum { sim_effect_parameters_max = 4, sim_effect_scan_max = 16, sim_effects_max = 24, sim_tones_max = 8 };
 
 /// How the motor moves at one instant. Angles in rad, or positions in m on a linear axis.
 struct sim_motion {
@@ -16,6 +16,8 @@ struct sim_motion {
     double velocity;
     double time_s;
     bool linear; ///< m and N instead of rad and Nm
+    double
+        radius; ///< position per rad of the motor's shaft: 1, on a linear axis the pulley's. Only `sense` is given it
 };
 
 /// What the motor has to overcome at one instant. Torques in Nm, or forces in N; positive ones oppose positive speed.
@@ -25,6 +27,33 @@ struct sim_opposing {
     double dry;             ///< friction magnitude that does not: Coulomb, Stribeck; >= 0
     double positive_factor; ///< on all friction for motion in each direction, 1 without asymmetry
     double negative_factor;
+};
+
+/// The belt between motor and load at one instant. Its torque on the load is stiffness * twist + damping * twist_rate.
+struct sim_belt {
+    double twist;      ///< motor minus load, rad or m, without what a gap takes of it
+    double twist_rate; ///< 0 where the belt hangs loose
+    double stiffness;  ///< Nm/rad or N/m at this instant
+    double damping;    ///< Nm s/rad or N s/m
+};
+
+/// A further mass on its own spring and damper.
+struct sim_attached_mass {
+    double inertia;   ///< kg m2 or kg
+    double stiffness; ///< Nm/rad or N/m
+    double damping;   ///< Nm s/rad or N s/m
+};
+
+/// What the motor's sensors say.
+struct sim_sensed {
+    double position, velocity;
+};
+
+/// Columns of a recording as they were recorded. A column that it lacks is NULL.
+struct sim_columns {
+    size_t rows;
+    double sample_rate_hz;
+    const double *torque, *position, *velocity;
 };
 
 /// How diagnosis moves a parameter.
@@ -41,6 +70,8 @@ struct sim_parameter {
     enum sim_parameter_kind kind;
     double minimum, maximum; ///< physical bounds, rotary units
     double linear_minimum, linear_maximum;
+    bool optional; ///< a model file may leave it out: then it is `usual`
+    double usual;
     /// For effects that are parameters of the base model: offset of the double in struct sim_model; else SIZE_MAX.
     size_t model_offset;
 };
@@ -52,6 +83,10 @@ enum sim_place {
     sim_place_friction_scale, ///< after all friction
     sim_place_motor,
     sim_place_actuator,
+    sim_place_belt, ///< between motor and load: needs two masses
+    sim_place_load,
+    sim_place_sensor, ///< what is measured, not what moves
+    sim_place_record, ///< rows of the recording
 };
 
 struct sim_model;
@@ -61,8 +96,13 @@ struct sim_coverage {
     double position_span; ///< largest minus smallest position, rad or m
     double velocity_rms, velocity_peak;
     double torque_rms; ///< Nm or N
+    double torque_peak;
+    double reference_peak; ///< of the torque asked for; 0: not recorded
+    double position_mean;
     double duration_s;
     double frequency_max_hz; ///< highest excited line
+    size_t tone_count;
+    double tones_hz[sim_tones_max]; ///< strongest lines of what the model leaves, between the excited ones
     bool linear;
 };
 
@@ -79,8 +119,31 @@ struct sim_effect {
     enum sim_place place;
     size_t parameter_count;
     struct sim_parameter parameters[sim_effect_parameters_max];
-    /// Adds what the effect contributes at one instant; NULL for structural effects.
+    bool steady;  ///< `oppose` adds the same at every instant, except where the direction of motion changes
+    bool in_time; ///< depends on the time since the run began, so that no two periods are alike
+
+    // What the effect does; each hook is NULL where it does nothing.
+
+    /// Adds what the effect contributes to the torque against the motor at one instant.
     void (*oppose)(const double *parameters, const struct sim_motion *motion, struct sim_opposing *io_opposing);
+    /// Dry friction does not switch but builds up: the distance over which it comes within 1/e of its level.
+    double (*build_up)(const double *parameters);
+    /// Changes the belt at one instant. Called in the order of sim_effects, which is that of the names: backlash takes
+    /// its part of the twist before a spring that hardens sees it.
+    void (*bend)(const double *parameters, const struct sim_motion *motion, struct sim_belt *io_belt);
+    /// Gives the mass that hangs on the load (on the one body of a rigid drive). A model has room for one.
+    void (*attach)(const double *parameters, struct sim_attached_mass *out_mass);
+    /// Torque that the motor makes of what comes out of lag and dead time.
+    double (*limit)(const double *parameters, double torque);
+    /// Changes what the motor's sensors say of its motion.
+    void (*sense)(const double *parameters, const struct sim_motion *motion, struct sim_sensed *io_sensed);
+    /// Whether a row of the record repeats the one before, decided by a number that is uniform in (0, 1).
+    bool (*lose)(const double *parameters, double uniform);
+    /// Finds the effect in a recording exactly, without a likelihood: false if it is not there. Marks the rows that it
+    /// spoils (rows values, all written) and says how far from chance that is, in nats.
+    bool (*notice)(const struct sim_columns *columns, double *out_parameters, double *out_deviations,
+                   double *out_evidence, bool *out_rows);
+
     /// Switches a structural effect on in a model whose structure lacks it; NULL if there is nothing to switch.
     void (*engage)(struct sim_model *model);
     /// Whether diagnosis may ask for the effect on top of this model at all; NULL: always.

@@ -53,6 +53,11 @@ static const char *check_effects(const struct sim_model *model, char *buffer, si
     for (size_t e = 0; sim_effects[e]; e++) {
         if (!model->effect_on[e])
             continue;
+        if (sim_effects[e]->place == sim_place_belt && model->structure != sim_structure_two_mass) {
+            snprintf(buffer, size, "effects.%s: a drive of two masses is needed, this one is rigid",
+                     sim_effects[e]->id);
+            return buffer;
+        }
         for (size_t i = 0; i < sim_effects[e]->parameter_count; i++) {
             const struct sim_parameter *p = &sim_effects[e]->parameters[i];
             double value = model->effect_parameters[e][i];

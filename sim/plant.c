@@ -3,209 +3,267 @@
 
 #include "sim/effect.h"
 
-#include <assert.h>
 #include <math.h>
-#include <string.h>
 
-// ---- Actuator
-
-void sim_actuator_init(struct sim_actuator *self)
-{
-    memset(self, 0, sizeof *self);
-}
-
-void sim_actuator_hold(struct sim_actuator *self, double torque_ref)
-{
-    self->newest = (self->newest + 1) % sim_actuator_history;
-    self->held[self->newest] = torque_ref;
-}
-
-static double held_ago(const struct sim_actuator *self, size_t samples)
-{
-    assert(samples < sim_actuator_history);
-    return self->held[(self->newest + sim_actuator_history - samples) % sim_actuator_history];
-}
-
-double sim_actuator_now(const struct sim_actuator *self, const struct sim_model *model)
-{
-    if (model->torque_lag_s > 0.0)
-        return self->torque;
-    const double rounding = 1e-9; // a dead time of whole samples must not be counted as one more
-    return held_ago(self, (size_t)ceil(fmax(model->dead_time_s * model->sample_rate_hz - rounding, 0.0)));
-}
-
-/// Moves the lag's state over `samples` of a constant input; returns the integral of the torque, in Nm samples.
-static double lagged(struct sim_actuator *self, const struct sim_model *model, double input, double samples)
-{
-    if (!(model->torque_lag_s > 0.0)) {
-        self->torque = input;
-        return input * samples;
-    }
-    double lag_samples = model->torque_lag_s * model->sample_rate_hz;
-    double change = (self->torque - input) * -expm1(-samples / lag_samples);
-    self->torque -= change;
-    return input * samples + change * lag_samples;
-}
-
-double sim_actuator_substep(struct sim_actuator *self, const struct sim_model *model, size_t index)
-{
-    // Samples from the start of the current one, seen through the dead time. A held value begins at every whole number,
-    // so a substep meets at most one change, and both parts of it are exact.
-    double delay = model->dead_time_s * model->sample_rate_hz;
-    double from = (double)index / sim_substeps - delay, to = (double)(index + 1) / sim_substeps - delay;
-    double change = ceil(from);
-    if (change > from && change < to) {
-        double before = lagged(self, model, held_ago(self, (size_t)-floor(from)), change - from);
-        return sim_substeps * (before + lagged(self, model, held_ago(self, (size_t)-change), to - change));
-    }
-    return sim_substeps * lagged(self, model, held_ago(self, (size_t)-floor(from)), to - from);
-}
-
-// ---- Plant
+/// The plant as the chain of its masses.
+struct state {
+    double position[sim_masses_max], velocity[sim_masses_max];
+    double bristle, time_s;
+};
 
 void sim_plant_init(struct sim_plant *self, double position)
 {
-    *self = (struct sim_plant){.position = position, .load_position = position};
+    *self = (struct sim_plant){.position = position, .load_position = position, .attached_position = position};
 }
 
-/// The model as one step sees it: which effects oppose the motion is looked up once, not at every instant.
-struct field {
-    const struct sim_model *model;
-    bool two_mass;
-    double torque;
-    size_t count;
-    size_t effects[sim_effects_max];
-};
-
-static void field_init(struct field *self, const struct sim_model *model, double torque)
+static bool has_load(const struct sim_stepper *stepper)
 {
-    self->model = model;
-    self->two_mass = model->structure == sim_structure_two_mass;
-    self->torque = torque;
-    self->count = 0;
-    for (size_t e = 0; sim_effects[e]; e++)
-        if (model->effect_on[e] && sim_effects[e]->oppose)
-            self->effects[self->count++] = e;
+    return stepper->model.structure == sim_structure_two_mass;
 }
 
-static void field_opposing(const struct field *self, const struct sim_motion *motion, struct sim_opposing *out_opposing)
+static void take(const struct sim_plant *plant, const struct sim_stepper *stepper, struct state *out)
 {
-    *out_opposing = (struct sim_opposing){
-        .viscous = self->model->viscous_friction_Nms_per_rad * motion->velocity,
-        .dry = self->model->coulomb_friction_Nm,
-        .positive_factor = 1.0,
-        .negative_factor = 1.0,
-    };
-    for (size_t i = 0; i < self->count; i++) {
-        size_t e = self->effects[i];
-        sim_effects[e]->oppose(self->model->effect_parameters[e], motion, out_opposing);
+    size_t attached = has_load(stepper) ? 2 : 1;
+    out->position[0] = plant->position;
+    out->velocity[0] = plant->velocity;
+    out->position[1] = plant->load_position;
+    out->velocity[1] = plant->load_velocity;
+    if (attached < stepper->chain.masses) {
+        out->position[attached] = plant->attached_position;
+        out->velocity[attached] = plant->attached_velocity;
+    }
+    out->bristle = plant->bristle;
+    out->time_s = plant->time_s;
+}
+
+static void give(const struct state *s, const struct sim_stepper *stepper, struct sim_plant *out)
+{
+    size_t masses = stepper->chain.masses, load = has_load(stepper) ? 1 : 0;
+    *out = (struct sim_plant){.position = s->position[0],
+                              .velocity = s->velocity[0],
+                              .load_position = s->position[load],
+                              .load_velocity = s->velocity[load],
+                              .attached_position = s->position[masses - 1],
+                              .attached_velocity = s->velocity[masses - 1],
+                              .bristle = s->bristle,
+                              .time_s = s->time_s};
+}
+
+// ---- Torques at an instant
+
+static void opposing(const struct sim_stepper *stepper, const struct sim_motion *motion, struct sim_opposing *out)
+{
+    *out = stepper->steady;
+    out->viscous += stepper->model.viscous_friction_Nms_per_rad * motion->velocity;
+    for (size_t i = 0; i < stepper->oppose.count; i++) {
+        size_t e = stepper->oppose.effects[i];
+        sim_effects[e]->oppose(stepper->model.effect_parameters[e], motion, out);
     }
 }
 
 void sim_plant_opposing(const struct sim_model *model, const struct sim_motion *motion,
                         struct sim_opposing *out_opposing)
 {
-    struct field field;
-    field_init(&field, model, 0.0);
-    field_opposing(&field, motion, out_opposing);
+    struct sim_stepper stepper;
+    sim_stepper_init_once(&stepper, model, 1.0);
+    opposing(&stepper, motion, out_opposing);
 }
 
-struct rates {
-    double velocity, acceleration, load_velocity, load_acceleration;
-};
-
-static double belt_torque(const struct sim_plant *p, const struct sim_model *model)
+static struct sim_motion motion_of(const struct state *s, const struct sim_stepper *stepper)
 {
-    return model->belt_stiffness_Nm_per_rad * (p->position - p->load_position) +
-           model->belt_damping_Nms_per_rad * (p->velocity - p->load_velocity);
+    return (struct sim_motion){
+        .position = s->position[0], .velocity = s->velocity[0], .time_s = s->time_s, .linear = stepper->model.linear};
 }
 
-/// Torque left for acceleration and dry friction at the present state, and that friction for motion in `direction`.
-static double driving_torque(const struct sim_plant *p, const struct field *field, int direction, double *out_dry)
+/// The belt as it is now, after what effects make of it.
+static struct sim_belt belt_of(const struct state *s, const struct sim_stepper *stepper)
 {
-    struct sim_motion motion = {
-        .position = p->position, .velocity = p->velocity, .time_s = p->time_s, .linear = field->model->linear};
+    struct sim_motion motion = motion_of(s, stepper);
+    struct sim_belt belt = {.twist = s->position[0] - s->position[1],
+                            .twist_rate = s->velocity[0] - s->velocity[1],
+                            .stiffness = stepper->chain.stiffness[0],
+                            .damping = stepper->chain.damping[0]};
+    for (size_t i = 0; i < stepper->bend.count; i++) {
+        size_t e = stepper->bend.effects[i];
+        sim_effects[e]->bend(stepper->model.effect_parameters[e], &motion, &belt);
+    }
+    return belt;
+}
+
+/// Torque of each link on the mass behind it.
+static void link_torques(const struct state *s, const struct sim_stepper *stepper, double *out)
+{
+    const struct sim_chain *c = &stepper->chain;
+    for (size_t i = 0; i + 1 < c->masses; i++)
+        out[i] = c->stiffness[i] * (s->position[i] - s->position[i + 1]) +
+                 c->damping[i] * (s->velocity[i] - s->velocity[i + 1]);
+    if (stepper->bend.count == 0)
+        return;
+    struct sim_belt belt = belt_of(s, stepper);
+    out[0] = belt.stiffness * belt.twist + belt.damping * belt.twist_rate;
+}
+
+/// Torque left for acceleration and dry friction, and that friction's level for motion in `direction`.
+static double driving_torque(const struct state *s, const struct sim_stepper *stepper, double torque, double link,
+                             int direction, double *out_dry)
+{
+    struct sim_motion motion = motion_of(s, stepper);
     struct sim_opposing o;
-    field_opposing(field, &motion, &o);
+    opposing(stepper, &motion, &o);
     double factor = direction >= 0 ? o.positive_factor : o.negative_factor;
     *out_dry = factor * o.dry;
-    double belt = field->two_mass ? belt_torque(p, field->model) : 0.0;
-    return field->torque - o.smooth - factor * o.viscous - belt;
+    return torque - o.smooth - factor * o.viscous - link;
 }
 
-/// Time derivatives while the motor moves in `direction` (+1, -1) or sticks (0).
-static struct rates plant_rates(const struct sim_plant *p, const struct field *field, int direction)
+/// Where a Runge-Kutta step starts, and under what.
+struct course {
+    const struct sim_stepper *stepper;
+    double torque;
+    int direction; ///< of the motor's motion, +1 or -1; 0: it is held
+    double from;   ///< motor position at which the friction was `bristle` and its level `level`
+    double bristle, level;
+};
+
+/// Friction that builds up, dF/dx = (level - F) / distance, its level straight from where the step began to here: what
+/// was missing fades with the way, whatever the speed.
+static double built_up(const struct course *course, double position, double dry)
 {
-    const struct sim_model *model = field->model;
-    struct rates r = {.velocity = p->velocity, .load_velocity = p->load_velocity};
-    if (direction != 0) {
-        double dry;
-        double driving = driving_torque(p, field, direction, &dry);
-        double inertia = model->motor_inertia_kgm2 + (field->two_mass ? 0.0 : model->load_inertia_kgm2);
-        r.acceleration = (driving - direction * dry) / inertia;
+    double way = fabs(position - course->from) / course->stepper->build_up, level = course->direction * dry;
+    if (!(way > 0.0))
+        return course->bristle;
+    double faded = -expm1(-way);
+    return level - (level - course->level) * faded / way + (course->bristle - course->level) * (1.0 - faded);
+}
+
+static double motor_acceleration(const struct state *s, const struct course *course, double link)
+{
+    const struct sim_stepper *stepper = course->stepper;
+    double dry, driving = driving_torque(s, stepper, course->torque, link, course->direction, &dry);
+    double friction = stepper->build_up > 0.0 ? built_up(course, s->position[0], dry) : (double)course->direction * dry;
+    return (driving - friction) / stepper->chain.inertia[0];
+}
+
+/// Dry friction that motion in a direction would have in the end.
+static double dry_level(const struct state *s, const struct sim_stepper *stepper, int direction)
+{
+    double dry;
+    driving_torque(s, stepper, 0.0, 0.0, direction, &dry);
+    return dry;
+}
+
+// ---- Runge-Kutta steps
+
+struct rates {
+    double velocity[sim_masses_max], acceleration[sim_masses_max];
+};
+
+static void rates_at(const struct state *s, const struct course *course, struct rates *out)
+{
+    const struct sim_chain *c = &course->stepper->chain;
+    double link[sim_masses_max] = {0.0};
+    if (c->masses > 1)
+        link_torques(s, course->stepper, link);
+    out->velocity[0] = s->velocity[0];
+    out->acceleration[0] = course->direction != 0 ? motor_acceleration(s, course, link[0]) : 0.0;
+    for (size_t i = 1; i < c->masses; i++) {
+        out->velocity[i] = s->velocity[i];
+        out->acceleration[i] = (link[i - 1] - link[i]) / c->inertia[i];
     }
-    if (field->two_mass)
-        r.load_acceleration = belt_torque(p, model) / model->load_inertia_kgm2;
-    else
-        r.load_acceleration = r.acceleration;
-    return r;
 }
 
-static struct sim_plant advanced(const struct sim_plant *p, const struct rates *r, double dt_s)
+static void advance(const struct state *from, const struct rates *r, size_t masses, double dt_s, struct state *out)
 {
-    struct sim_plant q = *p;
-    q.position += dt_s * r->velocity;
-    q.velocity += dt_s * r->acceleration;
-    q.load_position += dt_s * r->load_velocity;
-    q.load_velocity += dt_s * r->load_acceleration;
-    q.time_s += dt_s;
-    return q;
+    for (size_t i = 0; i < masses; i++) {
+        out->position[i] = from->position[i] + dt_s * r->velocity[i];
+        out->velocity[i] = from->velocity[i] + dt_s * r->acceleration[i];
+    }
+    out->time_s = from->time_s + dt_s;
+}
+
+static void add(struct rates *io_sum, const struct rates *r, size_t masses, double weight)
+{
+    for (size_t i = 0; i < masses; i++) {
+        io_sum->velocity[i] += weight * r->velocity[i];
+        io_sum->acceleration[i] += weight * r->acceleration[i];
+    }
 }
 
 /// One classical Runge-Kutta step with the direction of friction held.
-static struct sim_plant runge_kutta(const struct sim_plant *p, const struct field *field, int direction, double dt_s)
+static void runge_kutta(const struct state *from, const struct sim_stepper *stepper, double torque, int direction,
+                        double dt_s, struct state *out)
 {
-    struct rates a = plant_rates(p, field, direction);
-    struct sim_plant at = advanced(p, &a, dt_s / 2);
-    struct rates b = plant_rates(&at, field, direction);
-    at = advanced(p, &b, dt_s / 2);
-    struct rates c = plant_rates(&at, field, direction);
-    at = advanced(p, &c, dt_s);
-    struct rates d = plant_rates(&at, field, direction);
-    struct rates mean = {
-        .velocity = (a.velocity + 2 * b.velocity + 2 * c.velocity + d.velocity) / 6,
-        .acceleration = (a.acceleration + 2 * b.acceleration + 2 * c.acceleration + d.acceleration) / 6,
-        .load_velocity = (a.load_velocity + 2 * b.load_velocity + 2 * c.load_velocity + d.load_velocity) / 6,
-        .load_acceleration =
-            (a.load_acceleration + 2 * b.load_acceleration + 2 * c.load_acceleration + d.load_acceleration) / 6,
-    };
-    return advanced(p, &mean, dt_s);
+    struct course course = {stepper, torque, direction, from->position[0], from->bristle, 0.0};
+    bool builds_up = stepper->build_up > 0.0 && direction != 0;
+    if (builds_up)
+        course.level = direction * dry_level(from, stepper, direction);
+    size_t masses = stepper->chain.masses;
+    struct rates sum, r; // of the masses that there are
+    struct state at;
+    rates_at(from, &course, &sum);
+    advance(from, &sum, masses, dt_s / 2, &at);
+    rates_at(&at, &course, &r);
+    add(&sum, &r, masses, 2.0);
+    advance(from, &r, masses, dt_s / 2, &at);
+    rates_at(&at, &course, &r);
+    add(&sum, &r, masses, 2.0);
+    advance(from, &r, masses, dt_s, &at);
+    rates_at(&at, &course, &r);
+    add(&sum, &r, masses, 1.0);
+    out->bristle = from->bristle;
+    advance(from, &sum, masses, dt_s / 6, out);
+    out->time_s = from->time_s + dt_s;
+    if (builds_up)
+        out->bristle = built_up(&course, out->position[0], dry_level(out, stepper, direction));
+}
+
+/// By how much the torque on a motor at rest exceeds what holds it, in the direction in which it exceeds it more.
+static double excess(const struct state *s, const struct sim_stepper *stepper, double torque, int *out_direction)
+{
+    double link[sim_masses_max] = {0.0}, most = -INFINITY;
+    if (stepper->chain.masses > 1)
+        link_torques(s, stepper, link);
+    for (int direction = -1; direction <= 1; direction += 2) {
+        double dry;
+        double driving = driving_torque(s, stepper, torque, link[0], direction, &dry);
+        if (stepper->build_up > 0.0) { // it does not switch: what it is now counts
+            driving -= s->bristle;
+            dry = 0.0;
+        }
+        if (direction * driving - dry > most) {
+            most = direction * driving - dry;
+            *out_direction = direction;
+        }
+    }
+    return most;
 }
 
 /// Direction in which a motor at rest sets off, 0 if friction holds it.
-static int breakaway(const struct sim_plant *p, const struct field *field)
+static int breakaway(const struct state *s, const struct sim_stepper *stepper, double torque)
 {
-    for (int direction = -1; direction <= 1; direction += 2) {
-        double dry;
-        double driving = driving_torque(p, field, direction, &dry);
-        if (direction * driving > dry)
-            return direction;
-    }
-    return 0;
+    int direction;
+    return excess(s, stepper, torque, &direction) > 0.0 ? direction : 0;
+}
+
+static int sign_of(double value)
+{
+    return value > 0.0 ? 1 : value < 0.0 ? -1 : 0;
 }
 
 /// Time after which the motor comes to rest in a step that ends with it running backward at end_speed. False position:
 /// the straight line alone would drop a speed of the second order of the step, which a belt's changing pull makes felt.
-static double time_to_rest(const struct sim_plant *p, const struct field *field, int direction, double dt_s,
+static double time_to_rest(const struct state *s, const struct sim_stepper *stepper, double torque, double dt_s,
                            double end_speed)
 {
     enum { refinements = 2 };
-    double low_s = 0.0, low = fabs(p->velocity), high_s = dt_s, high = end_speed, at_s = 0.0;
+    int direction = sign_of(s->velocity[0]);
+    double low_s = 0.0, low = fabs(s->velocity[0]), high_s = dt_s, high = end_speed, at_s = 0.0;
     for (int i = 0; i <= refinements; i++) {
         at_s = low_s + (high_s - low_s) * low / (low + high);
         if (i == refinements)
             break;
-        double speed = direction * runge_kutta(p, field, direction, at_s).velocity;
+        struct state at = *s;
+        runge_kutta(s, stepper, torque, direction, at_s, &at);
+        double speed = direction * at.velocity[0];
         if (speed > 0.0) {
             low_s = at_s;
             low = speed;
@@ -219,51 +277,241 @@ static double time_to_rest(const struct sim_plant *p, const struct field *field,
     return at_s;
 }
 
-/// A step in which the motor may come to rest: split there, so that its speed is exactly zero while it sticks.
-static void step_with_reversal(struct sim_plant *self, const struct field *field, double dt_s)
+/// Holds the motor until the belt's pull exceeds what holds it, at most dt_s. Returns how long; out_direction is where
+/// it sets off then, 0 if it does not.
+static double hold(struct state *io, const struct sim_stepper *stepper, double torque, double dt_s, int *out_direction)
 {
-    // Each pass either ends the step or brings the motor to rest; after two rests in one step it is held to the end.
+    enum { refinements = 3 };
+    int unused;
+    struct state next = *io;
+    runge_kutta(io, stepper, torque, 0, dt_s, &next);
+    *out_direction = stepper->chain.masses > 1 ? breakaway(&next, stepper, torque) : 0;
+    double low_s = 0.0, high_s = dt_s, at_s = dt_s;
+    if (*out_direction != 0) {
+        double low = excess(io, stepper, torque, &unused), high = excess(&next, stepper, torque, &unused);
+        for (int i = 0; i < refinements && low < 0.0; i++) {
+            at_s = low_s + (high_s - low_s) * low / (low - high);
+            runge_kutta(io, stepper, torque, 0, at_s, &next);
+            double here = excess(&next, stepper, torque, &unused);
+            *(here > 0.0 ? &high_s : &low_s) = at_s;
+            *(here > 0.0 ? &high : &low) = here;
+        }
+    }
+    *io = next;
+    return at_s;
+}
+
+/// A step in which the motor may come to rest or set off: split there, so that its speed is exactly zero while it
+/// sticks.
+static void step_with_reversal(struct state *io, const struct sim_stepper *stepper, double torque, double dt_s)
+{
+    enum { events_max = 4 }; // in one step: after as many it is held to the end
     double left_s = dt_s;
-    for (int pass = 0; pass < 3 && left_s > 0.0; pass++) {
-        int direction = self->velocity > 0.0 ? 1 : self->velocity < 0.0 ? -1 : breakaway(self, field);
-        if (pass == 2 && self->velocity == 0.0)
-            direction = 0;
-        struct sim_plant next = runge_kutta(self, field, direction, left_s);
-        if (direction == 0 || direction * next.velocity >= 0.0) {
-            *self = next;
+    int set_off = 0;
+    for (int event = 0; left_s > 0.0; event++) {
+        bool rests = io->velocity[0] == 0.0;
+        int direction = rests ? set_off : sign_of(io->velocity[0]);
+        if (rests && direction == 0 && event < events_max)
+            direction = breakaway(io, stepper, torque);
+        if (direction == 0 && event < events_max) {
+            left_s -= hold(io, stepper, torque, left_s, &set_off);
+            if (set_off == 0)
+                return;
+            continue;
+        }
+        struct state next = *io;
+        runge_kutta(io, stepper, torque, direction, left_s, &next);
+        if (direction * next.velocity[0] >= 0.0) {
+            *io = next;
             return;
         }
         double part_s = left_s;
-        if (self->velocity == 0.0) // set off and came back within the step: it did not get away
+        if (rests) // set off and came back within the step: it did not get away
             direction = 0;
         else
-            part_s = time_to_rest(self, field, direction, left_s, fabs(next.velocity));
-        *self = runge_kutta(self, field, direction, part_s);
-        self->velocity = 0.0;
+            part_s = time_to_rest(io, stepper, torque, left_s, fabs(next.velocity[0]));
+        runge_kutta(io, stepper, torque, direction, part_s, &next);
+        *io = next;
+        io->velocity[0] = 0.0;
         left_s -= part_s;
+        set_off = 0;
     }
 }
 
-/// Steps that keep the Runge-Kutta error below 1e-5 of the fastest mode's swing.
-static size_t inner_steps(const struct sim_model *model, double dt_s)
+// ---- Steps as fine as needed
+
+/// Fastest mode with the belt as it is at this twist: a torque that grows with its cube is three times as stiff as it
+/// is strong.
+static double bent_rate(const struct state *s, const struct sim_stepper *stepper)
 {
-    if (model->structure != sim_structure_two_mass)
-        return 1;
-    double mobility = 1.0 / model->motor_inertia_kgm2 + 1.0 / model->load_inertia_kgm2;
-    double rate = sqrt(model->belt_stiffness_Nm_per_rad * mobility) + model->belt_damping_Nms_per_rad * mobility;
-    const double longest = 0.25, most = 400.0;
-    return (size_t)fmin(fmax(ceil(rate * dt_s / longest), 1.0), most);
+    struct sim_belt belt = belt_of(s, stepper);
+    double stiffer = 3.0 * belt.stiffness / stepper->chain.stiffness[0] - 2.0;
+    return stepper->chain_rate * sqrt(fmax(stiffer, 1.0));
+}
+
+static bool hangs_loose(const struct state *s, const struct sim_stepper *stepper)
+{
+    struct sim_belt belt = belt_of(s, stepper);
+    return belt.twist == 0.0 && belt.twist_rate == 0.0;
+}
+
+/// A step during which a belt may go slack or tight: near that instant in shorter steps.
+static void step_belt(struct state *io, const struct sim_stepper *stepper, double torque, double dt_s)
+{
+    enum { parts = 16 };
+    struct state next = *io;
+    bool loose = hangs_loose(io, stepper);
+    step_with_reversal(&next, stepper, torque, dt_s);
+    if (loose == hangs_loose(&next, stepper)) {
+        *io = next;
+        return;
+    }
+    for (int i = 0; i < parts; i++)
+        step_with_reversal(io, stepper, torque, dt_s / parts);
+}
+
+/// Rate that friction which builds up asks for: of the motor swinging on it, and of the way in which it does so.
+static double bristle_rate(const struct state *s, const struct sim_stepper *stepper, double dry)
+{
+    double swing = sqrt(dry / (stepper->build_up * stepper->chain.inertia[0]));
+    return fmax(swing, 0.5 * fabs(s->velocity[0]) / stepper->build_up);
+}
+
+/// Where friction is built up and the motor runs on, one step will do. Returns whether it did.
+static bool slide(struct state *io, const struct sim_stepper *stepper, double torque, double dry, double dt_s)
+{
+    const double whole = 1e-6;
+    int direction = sign_of(io->velocity[0]);
+    struct state next = *io;
+    if (direction == 0 || !(fabs(io->bristle - direction * dry) <= whole * dry))
+        return false;
+    runge_kutta(io, stepper, torque, direction, dt_s, &next);
+    if (!(direction * next.velocity[0] > 0.0))
+        return false;
+    *io = next;
+    return true;
+}
+
+static void step_finely(struct state *io, const struct sim_stepper *stepper, double torque)
+{
+    bool bent = stepper->bend.count > 0;
+    double dry = 0.0;
+    size_t steps = bent ? sim_stepper_inner_steps(bent_rate(io, stepper), stepper->dt_s) : stepper->inner_steps;
+    if (stepper->build_up > 0.0) {
+        dry = dry_level(io, stepper, sign_of(io->velocity[0]));
+        if (!bent && steps == 1 && slide(io, stepper, torque, dry, stepper->dt_s))
+            return;
+        size_t swings = sim_stepper_inner_steps(bristle_rate(io, stepper, dry), stepper->dt_s);
+        steps = swings > steps ? swings : steps;
+    }
+    double dt_s = stepper->dt_s / (double)steps;
+    for (size_t i = 0; i < steps; i++) {
+        if (bent)
+            step_belt(io, stepper, torque, dt_s);
+        else if (!(stepper->build_up > 0.0) || !slide(io, stepper, torque, dry, dt_s))
+            step_with_reversal(io, stepper, torque, dt_s);
+    }
+}
+
+// ---- Exact steps
+
+/// Moves the state by the transition of `direction`; the motor's first.
+static void transit(const struct state *from, const struct sim_stepper *stepper, int direction, double net,
+                    struct state *out)
+{
+    const struct sim_transition *t = &stepper->transitions[direction + 1];
+    size_t masses = stepper->chain.masses, columns = 2 * masses - 1;
+    double y[2 * sim_masses_max - 1];
+    y[0] = from->velocity[0];
+    for (size_t i = 1; i < masses; i++) {
+        y[2 * i - 1] = from->position[i] - from->position[0];
+        y[2 * i] = from->velocity[i];
+    }
+    for (size_t i = 0; i < masses; i++) {
+        double position = t->input[2 * i] * net, velocity = t->input[2 * i + 1] * net;
+        for (size_t j = 0; j < columns; j++) {
+            position += t->state[2 * i][j] * y[j];
+            velocity += t->state[2 * i + 1][j] * y[j];
+        }
+        out->position[i] = from->position[0] + position;
+        out->velocity[i] = velocity;
+    }
+    out->bristle = from->bristle;
+    out->time_s = from->time_s + stepper->dt_s;
+}
+
+static double steady_factor(const struct sim_stepper *stepper, int direction)
+{
+    return direction > 0 ? stepper->steady.positive_factor : stepper->steady.negative_factor;
+}
+
+/// The motor's motion half a step on, to second order.
+static struct sim_motion half_way(const struct state *s, const struct sim_stepper *stepper, double torque,
+                                  int direction)
+{
+    const struct sim_opposing *o = &stepper->steady;
+    double half_s = 0.5 * stepper->dt_s, link[sim_masses_max] = {0.0};
+    if (stepper->chain.masses > 1)
+        link_torques(s, stepper, link);
+    double viscous = stepper->model.viscous_friction_Nms_per_rad * s->velocity[0];
+    double net = torque - link[0] - o->smooth - steady_factor(stepper, direction) * (viscous + direction * o->dry);
+    double gained = half_s * net / stepper->chain.inertia[0];
+    struct sim_motion motion = motion_of(s, stepper);
+    motion.position += half_s * (motion.velocity + 0.5 * gained);
+    motion.velocity += gained;
+    motion.time_s += half_s;
+    return motion;
+}
+
+/// Torque that opposes the motor beside what its transition holds. What is not linear counts as it is half way: the
+/// exponential midpoint rule (Hochbruck and Ostermann 2010, 2.3), its error the third power of the step.
+static double opposing_torque(const struct state *s, const struct sim_stepper *stepper, double torque, int direction)
+{
+    double linear = steady_factor(stepper, direction) * stepper->model.viscous_friction_Nms_per_rad;
+    if (stepper->exact)
+        return stepper->steady.smooth + direction * steady_factor(stepper, direction) * stepper->steady.dry;
+    struct sim_motion motion = half_way(s, stepper, torque, direction);
+    struct sim_opposing o;
+    opposing(stepper, &motion, &o);
+    double factor = direction > 0 ? o.positive_factor : o.negative_factor;
+    return o.smooth + factor * (o.viscous + direction * o.dry) - linear * motion.velocity;
+}
+
+/// The whole step at once. Returns false, with nothing moved, if the motor reverses or breaks away meanwhile.
+static bool step_at_once(struct state *io, const struct sim_stepper *stepper, double torque)
+{
+    int direction = stepper->one_way ? 1 : sign_of(io->velocity[0]);
+    if (direction == 0)
+        direction = breakaway(io, stepper, torque);
+    struct state next = *io;
+    if (direction == 0) {
+        transit(io, stepper, 0, 0.0, &next);
+        next.position[0] = io->position[0];
+        next.velocity[0] = 0.0;
+        next.time_s = io->time_s + stepper->dt_s;
+        if (breakaway(&next, stepper, torque) != 0)
+            return false;
+    } else {
+        transit(io, stepper, direction, torque - opposing_torque(io, stepper, torque, direction), &next);
+        if (direction * next.velocity[0] < 0.0 && !stepper->one_way)
+            return false;
+    }
+    *io = next;
+    return true;
+}
+
+void sim_plant_move(struct sim_plant *self, const struct sim_stepper *stepper, double torque)
+{
+    struct state s = {.time_s = self->time_s};
+    take(self, stepper, &s);
+    if (!stepper->split || !step_at_once(&s, stepper, torque))
+        step_finely(&s, stepper, torque);
+    give(&s, stepper, self);
 }
 
 void sim_plant_step(struct sim_plant *self, const struct sim_model *model, double torque, double dt_s)
 {
-    struct field field;
-    field_init(&field, model, torque);
-    size_t steps = inner_steps(model, dt_s);
-    for (size_t i = 0; i < steps; i++)
-        step_with_reversal(self, &field, dt_s / (double)steps);
-    if (model->structure == sim_structure_rigid) {
-        self->load_position = self->position;
-        self->load_velocity = self->velocity;
-    }
+    struct sim_stepper stepper;
+    sim_stepper_init_once(&stepper, model, dt_s);
+    sim_plant_move(self, &stepper, torque);
 }

@@ -90,12 +90,12 @@ static void play_with_torque(struct player *self, double torque, struct sim_samp
 {
     struct sim_plant plant = self->drive.plant;
     struct sim_actuator actuator = self->drive.actuator;
-    const struct sim_model *model = self->drive.model;
+    const struct sim_stepper *stepper = &self->drive.stepper;
     play(self, 0, 0, out_sample);
     sim_actuator_hold(&actuator, out_sample->torque_ref);
     for (size_t i = 0; i < sim_substeps; i++) {
-        const double motor = sim_actuator_substep(&actuator, model, i) + torque;
-        sim_plant_step(&plant, model, motor, 1 / (model->sample_rate_hz * sim_substeps));
+        const double motor = sim_actuator_substep(&actuator, stepper, i) + torque;
+        sim_plant_move(&plant, stepper, motor);
     }
     self->drive.plant = plant;
 }

@@ -6,13 +6,22 @@
 #include <math.h>
 #include <string.h>
 
+/// Position and speed of the masses that were not measured: load, attached mass.
+enum { hidden_max = 4 };
+
 struct predictor {
-    const struct sim_model *model;
     const struct stretch *stretch;
+    struct sim_stepper stepper;
     struct sim_plant plant;
     struct sim_actuator actuator;
+    size_t hidden; ///< states, 0, 2 or 4
     bool cyclic;
 };
+
+static bool is_lost(const struct stretch *s, size_t n)
+{
+    return s->lost && s->lost[n];
+}
 
 /// Torque over substep i when only the measured torque is known: straight between its samples.
 static double measured_torque(const struct predictor *p, size_t n, size_t i)
@@ -24,6 +33,34 @@ static double measured_torque(const struct predictor *p, size_t n, size_t i)
     return torque[n] + part * (torque[next] - torque[n]);
 }
 
+/// Sets the motor to where the sensors saw it, unless they saw nothing.
+static void place_motor(struct predictor *p, size_t n)
+{
+    const struct stretch *s = p->stretch;
+    p->plant.time_s = s->start_s + (p->cyclic ? 0.0 : (double)n / p->stepper.model.sample_rate_hz);
+    if (is_lost(s, n))
+        return;
+    struct sim_motion motion = {.time_s = p->plant.time_s, .linear = p->stepper.model.linear};
+    struct sim_sensed sensed = {.position = s->position[n], .velocity = s->velocity[n]};
+    sim_stepper_unsense(&p->stepper, &sensed, &motion);
+    p->plant.position = motion.position;
+    p->plant.velocity = motion.velocity;
+}
+
+/// Speed that the sensors will say the motor has now.
+static double seen_velocity(const struct predictor *p)
+{
+    if (p->stepper.sense.count == 0)
+        return p->plant.velocity;
+    struct sim_motion motion = {.position = p->plant.position,
+                                .velocity = p->plant.velocity,
+                                .time_s = p->plant.time_s,
+                                .linear = p->stepper.model.linear};
+    struct sim_sensed sensed;
+    sim_stepper_sense(&p->stepper, &motion, &sensed);
+    return sensed.velocity;
+}
+
 /// Moves from sampling instant n to the next; returns the actuator's torque at instant n.
 static double predict_sample(struct predictor *p, size_t n)
 {
@@ -31,102 +68,246 @@ static double predict_sample(struct predictor *p, size_t n)
     double now = s->torque[n];
     if (s->torque_ref) {
         sim_actuator_hold(&p->actuator, s->torque_ref[n]);
-        now = sim_actuator_now(&p->actuator, p->model);
+        now = sim_actuator_now(&p->actuator, &p->stepper);
     }
-    p->plant.position = s->position[n];
-    p->plant.velocity = s->velocity[n];
+    place_motor(p, n);
     for (size_t i = 0; i < s->substeps; i++) {
-        double torque = s->torque_ref ? sim_actuator_substep(&p->actuator, p->model, i) : measured_torque(p, n, i);
-        sim_plant_step(&p->plant, p->model, torque, 1.0 / (p->model->sample_rate_hz * (double)s->substeps));
+        double torque = s->torque_ref ? sim_actuator_substep(&p->actuator, &p->stepper, i) : measured_torque(p, n, i);
+        sim_plant_move(&p->plant, &p->stepper, torque);
     }
     return now;
 }
 
-/// Free motion of the load over one sample, x' = A x for deviations x = (angle, speed): the simulator's own, of a motor
-/// that starts at the measured state and gives way to the belt until the next sample.
-static void free_motion(const struct predictor *p, double out_phi[2][2])
+// ---- The hidden masses' periodic state
+
+static void get_hidden(const struct predictor *p, double out[hidden_max])
 {
-    struct sim_model linear = *p->model;
+    const struct sim_plant *q = &p->plant;
+    bool load = p->stepper.model.structure == sim_structure_two_mass;
+    out[0] = load ? q->load_position : q->attached_position;
+    out[1] = load ? q->load_velocity : q->attached_velocity;
+    out[2] = q->attached_position;
+    out[3] = q->attached_velocity;
+}
+
+static void set_hidden(struct predictor *p, const double x[hidden_max])
+{
+    struct sim_plant *q = &p->plant;
+    bool load = p->stepper.model.structure == sim_structure_two_mass;
+    size_t attached = load ? 2 : 0;
+    if (load) {
+        q->load_position = x[0];
+        q->load_velocity = x[1];
+    }
+    if (p->hidden > attached) {
+        q->attached_position = x[attached];
+        q->attached_velocity = x[attached + 1];
+    }
+}
+
+struct square {
+    double a[hidden_max][hidden_max];
+};
+
+/// Free motion of the hidden masses over one sample, x' = A x for deviations: the simulator's own, of a motor that
+/// starts at the measured state and gives way until the next sample. A belt that is not linear counts as one that is.
+static void free_motion(const struct predictor *p, struct square *out_phi)
+{
+    struct predictor free = *p;
+    struct sim_model linear = p->stepper.model;
     linear.coulomb_friction_Nm = 0.0;
-    memset(linear.effect_on, 0, sizeof linear.effect_on);
-    for (size_t j = 0; j < 2; j++) {
-        struct sim_plant plant = {.load_position = j == 0, .load_velocity = j == 1};
+    for (size_t e = 0; sim_effects[e]; e++)
+        linear.effect_on[e] = linear.effect_on[e] && sim_effects[e]->attach;
+    sim_stepper_init_quick(&free.stepper, &linear, p->stepper.dt_s);
+    for (size_t j = 0; j < p->hidden; j++) {
+        double x[hidden_max] = {0.0};
+        x[j] = 1.0;
+        sim_plant_init(&free.plant, 0.0);
+        set_hidden(&free, x);
         for (size_t i = 0; i < p->stretch->substeps; i++)
-            sim_plant_step(&plant, &linear, 0.0, 1.0 / (linear.sample_rate_hz * (double)p->stretch->substeps));
-        out_phi[0][j] = plant.load_position;
-        out_phi[1][j] = plant.load_velocity;
+            sim_plant_move(&free.plant, &free.stepper, 0.0);
+        get_hidden(&free, x);
+        for (size_t i = 0; i < p->hidden; i++)
+            out_phi->a[i][j] = x[i];
     }
 }
 
-static void multiply(double a[2][2], double b[2][2], double out[2][2])
+static struct square product(size_t n, const struct square *a, const struct square *b)
 {
-    double c[2][2];
-    for (size_t i = 0; i < 2; i++)
-        for (size_t j = 0; j < 2; j++)
-            c[i][j] = a[i][0] * b[0][j] + a[i][1] * b[1][j];
-    memcpy(out, c, sizeof c);
+    struct square c = {{{0.0}}};
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < n; k++)
+            for (size_t j = 0; j < n; j++)
+                c.a[i][j] += a->a[i][k] * b->a[k][j];
+    return c;
 }
 
-/// io_phi to the power of n.
-static void raise(double io_phi[2][2], size_t n)
+static struct square power(size_t n, struct square phi, size_t exponent)
 {
-    double result[2][2] = {{1.0, 0.0}, {0.0, 1.0}};
-    for (; n > 0; n /= 2) {
-        if (n % 2 == 1)
-            multiply(result, io_phi, result);
-        multiply(io_phi, io_phi, io_phi);
+    struct square result = {{{0.0}}};
+    for (size_t i = 0; i < n; i++)
+        result.a[i][i] = 1.0;
+    for (; exponent > 0; exponent /= 2) {
+        if (exponent % 2 == 1)
+            result = product(n, &phi, &result);
+        phi = product(n, &phi, &phi);
     }
-    memcpy(io_phi, result, sizeof result);
+    return result;
 }
 
-/// The load's state that repeats after one period: x1 = Phi x0 + c for any start x0, so x* = (I - Phi)^-1 (x1 - Phi
-/// x0).
-static void settle_load(struct predictor *p, double position0, double velocity0)
+static void swap_rows(size_t n, struct square *m, double *b, size_t i, size_t j)
 {
-    double phi[2][2];
-    free_motion(p, phi);
-    raise(phi, p->stretch->samples);
-    double b0 = p->plant.load_position - phi[0][0] * position0 - phi[0][1] * velocity0;
-    double b1 = p->plant.load_velocity - phi[1][0] * position0 - phi[1][1] * velocity0;
-    double m00 = 1.0 - phi[0][0], m01 = -phi[0][1], m10 = -phi[1][0], m11 = 1.0 - phi[1][1];
-    double determinant = m00 * m11 - m01 * m10;
-    if (!(fabs(determinant) > 1e-9)) // an undamped load never settles: go on with what the pass left
-        return;
-    p->plant.load_position = (m11 * b0 - m01 * b1) / determinant;
-    p->plant.load_velocity = (m00 * b1 - m10 * b0) / determinant;
+    for (size_t k = 0; k < n; k++) {
+        double held = m->a[i][k];
+        m->a[i][k] = m->a[j][k];
+        m->a[j][k] = held;
+    }
+    double held = b[i];
+    b[i] = b[j];
+    b[j] = held;
 }
 
-/// One period ahead of the one that counts, for the load; for the actuator the last samples are enough.
+/// Solves m x = b in place by elimination with row exchange; false where a pivot is next to nothing.
+static bool solve(size_t n, struct square m, double *io_b)
+{
+    const double smallest = 1e-9;
+    for (size_t i = 0; i < n; i++) {
+        size_t best = i;
+        for (size_t j = i + 1; j < n; j++)
+            if (fabs(m.a[j][i]) > fabs(m.a[best][i]))
+                best = j;
+        swap_rows(n, &m, io_b, i, best);
+        if (!(fabs(m.a[i][i]) > smallest))
+            return false;
+        for (size_t j = i + 1; j < n; j++) {
+            double share = m.a[j][i] / m.a[i][i];
+            for (size_t k = i; k < n; k++)
+                m.a[j][k] -= share * m.a[i][k];
+            io_b[j] -= share * io_b[i];
+        }
+    }
+    for (size_t i = n; i-- > 0;) {
+        for (size_t k = i + 1; k < n; k++)
+            io_b[i] -= m.a[i][k] * io_b[k];
+        io_b[i] /= m.a[i][i];
+    }
+    return true;
+}
+
+/// After a pass from x0 to x1: the state that repeats after one period, x1 = Phi x0 + c for any start, so x* =
+/// (I - Phi)^-1 (x1 - Phi x0). An undamped mass never settles: it goes on with what the pass left.
+static void settle_hidden(struct predictor *p, const struct square *phi, const double x0[hidden_max])
+{
+    double x1[hidden_max], x[hidden_max] = {0.0};
+    struct square m = {{{0.0}}};
+    get_hidden(p, x1);
+    for (size_t i = 0; i < p->hidden; i++) {
+        x[i] = x1[i];
+        for (size_t j = 0; j < p->hidden; j++) {
+            x[i] -= phi->a[i][j] * x0[j];
+            m.a[i][j] = (i == j) - phi->a[i][j];
+        }
+    }
+    if (solve(p->hidden, m, x))
+        set_hidden(p, x);
+}
+
+/// Passes over the period until the hidden masses repeat: one where the belt is linear. What a linear guess leaves
+/// otherwise fades over the next.
+static void settle(struct predictor *p)
+{
+    size_t passes = p->stepper.bend.count > 0 ? 2 : 1;
+    struct square phi = {{{0.0}}};
+    free_motion(p, &phi);
+    phi = power(p->hidden, phi, p->stretch->samples);
+    for (size_t pass = 0; pass < passes; pass++) {
+        double x0[hidden_max] = {0.0};
+        get_hidden(p, x0);
+        for (size_t n = 0; n < p->stretch->samples; n++)
+            predict_sample(p, n);
+        settle_hidden(p, &phi, x0);
+    }
+}
+
+/// Samples at the end of the period after which friction that builds up has forgotten where it began.
+static size_t friction_memory(const struct predictor *p)
+{
+    const struct stretch *s = p->stretch;
+    const double lengths = 40.0; // exp(-40): nothing of the start is left
+    double way = 0.0, step_s = 1.0 / p->stepper.model.sample_rate_hz;
+    size_t n = 0;
+    while (n < s->samples && p->stepper.build_up > 0.0 && way < lengths * p->stepper.build_up)
+        way += fabs(s->velocity[s->samples - 1 - n++]) * step_s;
+    return n;
+}
+
+/// One period ahead of the one that counts, for the hidden masses; for actuator and friction the last samples are
+/// enough.
 static void warm_up(struct predictor *p)
 {
     size_t samples = p->stretch->samples;
-    bool two = p->model->structure == sim_structure_two_mass;
+    if (p->hidden > 0) {
+        settle(p);
+        return;
+    }
     const double lags = 40.0; // exp(-40): nothing of the start is left
-    double needed = sim_actuator_history + lags * p->model->torque_lag_s * p->model->sample_rate_hz;
+    double needed = fmax(sim_actuator_history + lags * p->stepper.lag_samples, (double)friction_memory(p));
     size_t history = needed < (double)samples ? (size_t)needed : samples;
-    double position0 = p->plant.load_position, velocity0 = p->plant.load_velocity;
-    for (size_t n = two ? 0 : samples - history; n < samples; n++)
+    for (size_t n = samples - history; n < samples; n++)
         predict_sample(p, n);
-    if (two)
-        settle_load(p, position0, velocity0);
+}
+
+// ---- A stretch
+
+static void start(struct predictor *p)
+{
+    double x[hidden_max];
+    sim_plant_init(&p->plant, 0.0);
+    place_motor(p, 0);
+    for (size_t i = 0; i < hidden_max; i++)
+        x[i] = i % 2 == 0 ? p->plant.position : p->plant.velocity;
+    set_hidden(p, x);
+    sim_actuator_init(&p->actuator);
 }
 
 void predict(const struct sim_model *model, const struct stretch *stretch, bool cyclic, double scale_inertia,
              double *out_mechanics, double *out_actuator)
 {
-    struct predictor p = {.model = model, .stretch = stretch, .cyclic = cyclic};
-    sim_plant_init(&p.plant, stretch->position[0]);
-    p.plant.load_velocity = stretch->velocity[0];
-    sim_actuator_init(&p.actuator);
+    struct predictor p = {.stretch = stretch, .cyclic = cyclic};
+    sim_stepper_init_quick(&p.stepper, model, 1.0 / (model->sample_rate_hz * (double)stretch->substeps));
+    p.hidden = 2 * (p.stepper.chain.masses - 1);
+    start(&p);
     if (cyclic)
         warm_up(&p);
     double scale = scale_inertia * model->sample_rate_hz;
     for (size_t n = 0; n < stretch->samples; n++) {
         double now = predict_sample(&p, n);
         bool last = n + 1 == stretch->samples;
-        double reached = stretch->velocity[last ? 0 : n + 1];
-        out_mechanics[n] = last && !cyclic ? 0.0 : scale * (reached - p.plant.velocity);
+        size_t next = last ? 0 : n + 1;
+        bool unseen = (last && !cyclic) || is_lost(stretch, n) || is_lost(stretch, next);
+        out_mechanics[n] = unseen ? 0.0 : scale * (stretch->velocity[next] - seen_velocity(&p));
         if (out_actuator)
-            out_actuator[n] = stretch->torque[n] - now;
+            out_actuator[n] = is_lost(stretch, n) ? 0.0 : stretch->torque[n] - now;
+    }
+}
+
+void predict_kinematics(const struct sim_model *model, const struct stretch *stretch, double *out_kinematics)
+{
+    struct sim_stepper stepper;
+    sim_stepper_init_once(&stepper, model, 1.0 / model->sample_rate_hz);
+    double ahead_s = 1e-3 / model->sample_rate_hz;
+    for (size_t n = 0; n < stretch->samples; n++) {
+        struct sim_motion motion = {.time_s = stretch->start_s + (double)n / model->sample_rate_hz,
+                                    .linear = model->linear};
+        struct sim_sensed here = {.position = stretch->position[n], .velocity = stretch->velocity[n]}, ahead;
+        sim_stepper_unsense(&stepper, &here, &motion);
+        struct sim_motion later = motion;
+        later.position += ahead_s * motion.velocity;
+        later.time_s += ahead_s;
+        sim_stepper_sense(&stepper, &motion, &here);
+        sim_stepper_sense(&stepper, &later, &ahead);
+        double error_rate = ((ahead.position - later.position) - (here.position - motion.position)) / ahead_s;
+        out_kinematics[n] =
+            is_lost(stretch, n) ? 0.0 : stretch->kinematics[n] - (here.velocity - motion.velocity - error_rate);
     }
 }

@@ -15,9 +15,16 @@
 ///            actuator[n]  = torque_measured[n] - torque_predicted[n]
 /// Shapes:    out arrays hold stretch->samples values; out_actuator may be NULL; it is zero without a reference
 /// Units:     Nm, or N on a linear axis: torque that the model lacks (mechanics) or makes too little of (actuator)
-/// Range:     cyclic: the stretch is one period and is run through until the load's state repeats; otherwise the last
+/// Range:     cyclic: the stretch is one period and is run through until the hidden state repeats; otherwise the last
 ///            mechanics value is 0
 void predict(const struct sim_model *model, const struct stretch *stretch, bool cyclic, double scale_inertia,
              double *out_mechanics, double *out_actuator);
+
+/// What is left of the contradiction between speed column and position column after the model's sensors have explained
+/// their part.
+/// Equation:  out[n] = kinematics[n] - (v_said - v - d(th_said - th)/dt),   kinematics: speed column - d(position)/dt
+/// Shapes:    stretch->samples values; stretch->kinematics must be there
+/// Units:     rad/s or m/s
+void predict_kinematics(const struct sim_model *model, const struct stretch *stretch, double *out_kinematics);
 
 #endif

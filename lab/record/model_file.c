@@ -245,7 +245,9 @@ static int read_parameter(const struct json_document *document, const cJSON *obj
     bool is_field = parameter->model_offset != SIZE_MAX;
     double *value = is_field ? value_at(model, parameter->model_offset) : own;
     int status = json_document_number(document, object, place, name, value, out_found, out_error);
-    if (status || *out_found || is_field || parameter->kind == sim_parameter_phase)
+    if (!status && !*out_found && !is_field && parameter->optional)
+        *own = parameter->usual;
+    if (status || *out_found || is_field || parameter->optional || parameter->kind == sim_parameter_phase)
         return status;
     char path[json_path_size];
     json_path_join(path, place, name);

@@ -26,8 +26,8 @@
 /// the total inertia (the same bandwidth). No end stops unless they are given. A seed above 2^53 is a string of digits,
 /// because a JSON number cannot hold it.
 ///
-/// Effects are named as in sim/effects/; every parameter that is not a phase has to be there (a phase is 0 by default),
-/// and all are totals, not differences. An effect whose parameter is a field above (viscous_friction, inertia,
+/// Effects are named as in sim/effects/; every parameter that is not a phase (0 by default) or optional (sim_parameter)
+/// has to be there, and all are totals, not differences. An effect whose parameter is a field above (viscous_friction, inertia,
 /// torque_lag ...) sets that field, over what the field itself says; belt_elasticity also makes the structure
 /// "two_mass". An effect that this build does not know is refused: the model without it would be another drive.
 ///

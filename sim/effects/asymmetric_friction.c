@@ -43,6 +43,7 @@ const struct sim_effect sim_effect_asymmetric_friction = {
                     .linear_minimum = -0.95,
                     .linear_maximum = 0.95,
                     .model_offset = SIZE_MAX}},
+    .steady = true,
     .oppose = asymmetric_oppose,
     .scan = asymmetric_scan,
     .measure = "at constant speeds both ways, and at half the level",

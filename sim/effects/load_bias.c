@@ -37,6 +37,7 @@ const struct sim_effect sim_effect_load_bias = {
                     .linear_minimum = -1e9,
                     .linear_maximum = 1e9,
                     .model_offset = SIZE_MAX}},
+    .steady = true,
     .oppose = bias_oppose,
     .scan = bias_scan,
     .measure = "the torque that holds the axis still when approached from both sides, and at half the level",

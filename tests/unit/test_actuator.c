@@ -14,6 +14,7 @@ static const double rounding = 1e-12;
 
 static struct sim_model model;
 static struct sim_actuator actuator;
+static struct sim_stepper stepper;
 static double reference[samples];
 
 void setUp(void)
@@ -25,6 +26,12 @@ void setUp(void)
 }
 
 void tearDown(void) {}
+
+/// After the model has its numbers.
+static void prepare(void)
+{
+    sim_stepper_init(&stepper, &model, 1.0 / (model.sample_rate_hz * sim_substeps));
+}
 
 /// Response at time t (samples) to the staircase of references up to number `newest`, by superposition of its steps:
 /// 1 - exp(-x / lag) each, x the time since the step came through the dead time; at a step itself the new value counts.
@@ -58,15 +65,16 @@ static void assert_staircase(double delay, double lag)
     sim_actuator_init(&actuator);
     model.dead_time_s = delay / model.sample_rate_hz;
     model.torque_lag_s = lag / model.sample_rate_hz;
+    prepare();
     for (size_t n = 0; n < samples; n++) {
         sim_actuator_hold(&actuator, reference[n]);
-        double now = sim_actuator_now(&actuator, &model);
+        double now = sim_actuator_now(&actuator, &stepper);
         TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(rounding, staircase((double)n, n, delay, lag), now, message);
         for (size_t i = 0; i < sim_substeps; i++) {
             double from = (double)n + (double)i / sim_substeps, to = (double)n + (double)(i + 1) / sim_substeps;
             double mean =
                 sim_substeps * (staircase_integral(to, n, delay, lag) - staircase_integral(from, n, delay, lag));
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(20.0 * rounding, mean, sim_actuator_substep(&actuator, &model, i),
+            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(20.0 * rounding, mean, sim_actuator_substep(&actuator, &stepper, i),
                                               message);
         }
     }
@@ -88,22 +96,24 @@ static void test_actuator_follows_the_staircase_exactly_for_any_dead_time_and_la
 
 static void test_actuator_without_lag_and_dead_time_gives_the_reference_at_once(void)
 {
+    prepare();
     for (size_t n = 0; n < samples; n++) {
         sim_actuator_hold(&actuator, reference[n]);
-        TEST_ASSERT_EQUAL_DOUBLE(reference[n], sim_actuator_now(&actuator, &model));
+        TEST_ASSERT_EQUAL_DOUBLE(reference[n], sim_actuator_now(&actuator, &stepper));
         for (size_t i = 0; i < sim_substeps; i++)
-            TEST_ASSERT_EQUAL_DOUBLE(reference[n], sim_actuator_substep(&actuator, &model, i));
+            TEST_ASSERT_EQUAL_DOUBLE(reference[n], sim_actuator_substep(&actuator, &stepper, i));
     }
 }
 
 static void test_actuator_with_lag_starts_from_where_it_was(void)
 {
     model.torque_lag_s = 1e-3;
+    prepare();
     sim_actuator_hold(&actuator, 1.0);
-    TEST_ASSERT_EQUAL_DOUBLE(0.0, sim_actuator_now(&actuator, &model));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, sim_actuator_now(&actuator, &stepper));
     for (size_t i = 0; i < sim_substeps; i++)
-        sim_actuator_substep(&actuator, &model, i);
-    TEST_ASSERT_DOUBLE_WITHIN(rounding, -expm1(-1.0), sim_actuator_now(&actuator, &model));
+        sim_actuator_substep(&actuator, &stepper, i);
+    TEST_ASSERT_DOUBLE_WITHIN(rounding, -expm1(-1.0), sim_actuator_now(&actuator, &stepper));
 }
 
 static void test_actuator_whole_dead_time_gives_the_reference_of_that_many_samples_ago(void)
@@ -114,12 +124,13 @@ static void test_actuator_whole_dead_time_gives_the_reference_of_that_many_sampl
             sim_actuator_init(&actuator);
             model.sample_rate_hz = rate_hz;
             model.dead_time_s = (double)ago / rate_hz;
+            prepare();
             for (size_t n = 0; n < 30; n++) {
                 double expected = n >= ago ? reference[n - ago] : 0.0;
                 sim_actuator_hold(&actuator, reference[n]);
-                TEST_ASSERT_EQUAL_DOUBLE(expected, sim_actuator_now(&actuator, &model));
+                TEST_ASSERT_EQUAL_DOUBLE(expected, sim_actuator_now(&actuator, &stepper));
                 for (size_t i = 0; i < sim_substeps; i++)
-                    TEST_ASSERT_DOUBLE_WITHIN(rounding, expected, sim_actuator_substep(&actuator, &model, i));
+                    TEST_ASSERT_DOUBLE_WITHIN(rounding, expected, sim_actuator_substep(&actuator, &stepper, i));
             }
         }
 }

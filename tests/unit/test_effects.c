@@ -134,7 +134,19 @@ static void test_effects_have_all_that_diagnosis_asks_for(void)
         TEST_ASSERT_NOT_NULL_MESSAGE(effect->measure, named(effect, "measure"));
         TEST_ASSERT_TRUE_MESSAGE(strlen(effect->measure) > 10, named(effect, "measure"));
         bool of_model = effect->parameters[0].model_offset != SIZE_MAX;
-        TEST_ASSERT_TRUE_MESSAGE(of_model || effect->oppose, named(effect, "neither in the model nor opposing"));
+        bool hooked = effect->oppose || effect->build_up || effect->bend || effect->attach || effect->limit ||
+                      effect->sense || effect->lose;
+        TEST_ASSERT_TRUE_MESSAGE(of_model || hooked, named(effect, "does nothing"));
+        TEST_ASSERT_TRUE_MESSAGE(!effect->steady || effect->oppose, named(effect, "steady at nothing"));
+        TEST_ASSERT_TRUE_MESSAGE(!effect->lose == !effect->notice, named(effect, "rows lost that nobody finds"));
+        bool belt = effect->place == sim_place_belt, two = false;
+        if (belt) { // without a second mass there is no belt
+            struct sim_model rigid;
+            sim_model_default(&rigid);
+            TEST_ASSERT_NOT_NULL_MESSAGE(effect->applies, named(effect, "applies"));
+            two = !effect->applies(&rigid);
+        }
+        TEST_ASSERT_EQUAL_INT_MESSAGE(belt, two, named(effect, "applies to a rigid drive"));
     }
 }
 
@@ -144,6 +156,8 @@ static struct sim_coverage coverage_of(bool linear)
                                           .velocity_rms = 0.1,
                                           .velocity_peak = 0.3,
                                           .torque_rms = 40.0,
+                                          .torque_peak = 120.0,
+                                          .reference_peak = 130.0,
                                           .duration_s = 20.0,
                                           .frequency_max_hz = 50.0,
                                           .linear = true}
@@ -151,6 +165,8 @@ static struct sim_coverage coverage_of(bool linear)
                                           .velocity_rms = 6.0,
                                           .velocity_peak = 15.0,
                                           .torque_rms = 0.4,
+                                          .torque_peak = 1.2,
+                                          .reference_peak = 1.3,
                                           .duration_s = 20.0,
                                           .frequency_max_hz = 100.0};
 }
@@ -300,10 +316,11 @@ static void test_effects_that_cannot_show_say_why(void)
             const struct sim_effect *effect = sim_effects[e];
             struct sim_model model = model_of(linear, false, 1000.0);
             struct sim_coverage good = coverage_of(linear), poor = good;
-            poor.position_span *= 1e-3;
-            poor.velocity_rms *= 1e-3;
-            poor.velocity_peak *= 1e-3;
-            poor.duration_s *= 1e-3;
+            poor.position_span *= 1e-6;
+            poor.velocity_rms *= 1e-6;
+            poor.velocity_peak *= 1e-6;
+            poor.duration_s *= 1e-6;
+            poor.reference_peak *= 1e-6;
             double values[sim_effect_parameters_max] = {0};
             TEST_ASSERT_TRUE(effect->scan(&model, &good, 0, values));
             char why[160] = "";

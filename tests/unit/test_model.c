@@ -153,6 +153,10 @@ static void test_model_check_refuses_parameters_of_effects_out_of_their_bounds(v
                 model.effect_parameters[e][i] = NAN; // no matter while it is off
             TEST_ASSERT_NULL(check());
             model.effect_on[e] = true;
+            if (effect->place == sim_place_belt) {
+                TEST_ASSERT_NOT_NULL_MESSAGE(check(), effect->id); // of a rigid drive
+                make_two_masses();
+            }
             for (size_t i = 0; i < effect->parameter_count; i++)
                 model.effect_parameters[e][i] =
                     linear ? effect->parameters[i].linear_minimum : effect->parameters[i].minimum;

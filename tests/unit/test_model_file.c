@@ -256,6 +256,22 @@ static void round_trip(bool linear)
     TEST_ASSERT_EQUAL_MEMORY(&out, &model, sizeof model);
 }
 
+static void test_model_optional_parameters_of_effects_have_usual_values(void)
+{
+    read_text("{\"structure\": \"rigid\", \"motor_inertia_kgm2\": 0.004, \"effects\": {"
+              "\"second_mode\": {\"mode_frequency_hz\": 40, \"mode_inertia_kgm2\": 0.0003},"
+              "\"encoder_eccentricity\": {\"amplitude_rad\": 0.001, \"phase_rad\": 1}}}");
+    TEST_ASSERT_EQUAL_DOUBLE(0.02, own_parameter("second_mode", "mode_damping_ratio"));
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, own_parameter("encoder_eccentricity", "speed_error_ratio"));
+}
+
+static void test_model_refuses_belts_of_rigid_drives(void)
+{
+    refuse(
+        "{\"structure\": \"rigid\", \"motor_inertia_kgm2\": 0.004, \"effects\": {\"backlash\": {\"gap_rad\": 0.001}}}",
+        "m.json:1: effects.backlash: a drive of two masses is needed");
+}
+
 static void test_model_write_reads_back_bit_for_bit(void)
 {
     round_trip(false);
@@ -334,6 +350,8 @@ int main(void)
     RUN_TEST(test_model_read_lets_an_effect_set_the_field_that_it_is);
     RUN_TEST(test_model_read_says_line_key_value_and_expectation);
     RUN_TEST(test_model_read_refuses_effects_that_cannot_run);
+    RUN_TEST(test_model_optional_parameters_of_effects_have_usual_values);
+    RUN_TEST(test_model_refuses_belts_of_rigid_drives);
     RUN_TEST(test_model_write_reads_back_bit_for_bit);
     RUN_TEST(test_model_write_puts_deviations_beside_what_they_belong_to);
     RUN_TEST(test_model_write_refuses_what_could_not_be_read);

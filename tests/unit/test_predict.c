@@ -14,6 +14,10 @@ enum { period = 800, settle = 60, rows = period * (settle + 1) };
 static const double two_pi = 6.283185307179586;
 /// Nm, of torques of about 0.5 Nm: rounding of speeds of about 20 rad/s times inertia and sampling rate.
 static const double rounding = 1e-9;
+/// Nm: what the prediction of effects that are not linear may be off by, which it takes as they are half way through a
+/// substep. A good torque sensor has ten times as much noise.
+static const double midway = 2e-4;
+static double allowed_Nm;
 
 static struct sim_model model;
 static double torque_ref[rows], torque[rows], position[rows], velocity[rows];
@@ -22,6 +26,7 @@ static struct stretch all, last_period;
 
 void setUp(void)
 {
+    allowed_Nm = rounding;
     sim_model_default(&model);
     model.sensors = (struct sim_sensors){0};
     model.motor_inertia_kgm2 = 0.004;
@@ -112,12 +117,12 @@ static void assert_predicts_itself(void)
     run_drive();
     TEST_ASSERT_NULL(sim_model_check(&model, (char[200]){0}, 200));
     predict(&model, &all, false, 0.005, mechanics, actuator);
-    assert_all_zero(rows, rounding);
+    assert_all_zero(rows, allowed_Nm);
     // The run has to repeat first, for its last period to be one: as good as the transient has decayed.
     for (size_t n = rows - period; n < rows; n++)
         TEST_ASSERT_DOUBLE_WITHIN(1e-10, position[n - period], position[n]);
     predict(&model, &last_period, true, 0.005, mechanics, actuator);
-    assert_all_zero(period, 100.0 * rounding);
+    assert_all_zero(period, fmax(allowed_Nm, 100.0 * rounding));
 }
 
 static void test_predict_leaves_nothing_of_a_rigid_drive(void)
@@ -127,6 +132,7 @@ static void test_predict_leaves_nothing_of_a_rigid_drive(void)
 
 static void test_predict_leaves_nothing_of_a_rigid_drive_with_every_friction_and_ripple(void)
 {
+    allowed_Nm = midway;
     switch_all_on();
     assert_predicts_itself();
 }
@@ -139,6 +145,7 @@ static void test_predict_leaves_nothing_of_two_masses(void)
 
 static void test_predict_leaves_nothing_of_two_masses_with_every_friction_and_ripple(void)
 {
+    allowed_Nm = midway;
     two_masses();
     switch_all_on();
     assert_predicts_itself();
@@ -155,10 +162,110 @@ static void test_predict_leaves_nothing_without_lag_and_with_whole_dead_time(voi
 
 static void test_predict_leaves_nothing_of_a_linear_axis(void)
 {
+    allowed_Nm = midway;
     model.linear = true;
     model.dead_time_s = 1.6e-3;
     switch_on("cogging", 0.03, 0.7, 0.4);
     assert_predicts_itself();
+}
+
+static void test_predict_leaves_nothing_of_a_third_mass(void)
+{
+    switch_on("second_mode", 14.0, 0.0006, 0.2);
+    assert_predicts_itself();
+    two_masses();
+    assert_predicts_itself();
+}
+
+static void test_predict_leaves_nothing_of_friction_that_builds_up(void)
+{
+    switch_on("presliding", 3e-3, 0.0, 0.0);
+    assert_predicts_itself();
+    two_masses();
+    switch_all_on();
+    assert_predicts_itself();
+}
+
+static void test_predict_leaves_nothing_of_a_belt_that_is_not_linear(void)
+{
+    two_masses();
+    switch_on("hardening_stiffness", 3e4, 0.0, 0.0);
+    assert_predicts_itself();
+    switch_on("position_dependent_stiffness", 0.1, 0.0, 0.0);
+    assert_predicts_itself();
+    switch_on("backlash", 5e-4, 0.0, 0.0);
+    assert_predicts_itself();
+}
+
+static void test_predict_leaves_nothing_of_an_eccentric_encoder_and_of_saturation(void)
+{
+    switch_on("encoder_eccentricity", 2e-3, 0.4, 1.0);
+    switch_on("torque_saturation", 1.6, 0.0, 0.0);
+    assert_predicts_itself();
+    switch_on("encoder_eccentricity", 2e-3, 0.4, 0.0);
+    assert_predicts_itself();
+}
+
+/// The clock runs in a run as it was recorded.
+static void test_predict_leaves_nothing_of_what_depends_on_time(void)
+{
+    allowed_Nm = midway;
+    switch_on("periodic_disturbance", 0.02, 0.4, 3.3);
+    switch_on("friction_drift", 0.4, 7.0, 0.0);
+    run_drive();
+    predict(&model, &all, false, 0.005, mechanics, actuator);
+    assert_all_zero(rows, allowed_Nm);
+    struct stretch later = all;
+    size_t first = 7 * period;
+    later.samples -= first;
+    later.torque_ref += first;
+    later.torque += first;
+    later.position += first;
+    later.velocity += first;
+    later.start_s = (double)first / model.sample_rate_hz;
+    predict(&model, &later, false, 0.005, mechanics, actuator);
+    for (size_t n = period; n < later.samples; n++) // the actuator's start is unknown
+        TEST_ASSERT_DOUBLE_WITHIN(allowed_Nm, 0.0, mechanics[n]);
+}
+
+/// Rows that were lost say nothing: the motor runs on, and what is beside them stays right.
+static void test_predict_runs_on_over_lost_rows(void)
+{
+    static bool lost[rows];
+    two_masses();
+    run_drive();
+    for (size_t n = 1; n < rows; n++) {
+        lost[n] = n % 37 == 0 || n % 37 == 1;
+        if (lost[n]) {
+            torque[n] = torque[n - 1];
+            position[n] = position[n - 1];
+            velocity[n] = velocity[n - 1];
+        }
+    }
+    all.lost = lost;
+    predict(&model, &all, false, 0.005, mechanics, actuator);
+    assert_all_zero(rows, rounding);
+    all.lost = NULL;
+    predict(&model, &all, false, 0.005, mechanics, actuator);
+    TEST_ASSERT_TRUE(fabs(mechanics[36]) > 1e-3 && fabs(mechanics[38]) > 1e-3);
+}
+
+/// Where the speed has a sensor of its own, it contradicts the eccentric angle by a sin(th + phase) v.
+static void test_predict_kinematics_is_what_an_eccentric_encoder_contradicts(void)
+{
+    static double kinematics[rows], out[rows];
+    for (int derived = 0; derived <= 1; derived++) {
+        switch_on("encoder_eccentricity", 2e-3, 0.4, derived);
+        run_drive();
+        memset(kinematics, 0, sizeof kinematics);
+        all.kinematics = kinematics;
+        predict_kinematics(&model, &all, out);
+        for (size_t n = 0; n < rows; n += 7) {
+            double th = position[n] - 2e-3 * cos(position[n] + 0.4); // to a's square
+            double expected = derived ? 0.0 : 2e-3 * sin(th + 0.4) * velocity[n];
+            TEST_ASSERT_DOUBLE_WITHIN(2e-5 * 10.0, -expected, out[n]);
+        }
+    }
 }
 
 /// What the model lacks comes out as torque, at the time and in the size in which it acted.
@@ -249,6 +356,13 @@ int main(void)
     RUN_TEST(test_predict_leaves_nothing_of_two_masses_with_every_friction_and_ripple);
     RUN_TEST(test_predict_leaves_nothing_without_lag_and_with_whole_dead_time);
     RUN_TEST(test_predict_leaves_nothing_of_a_linear_axis);
+    RUN_TEST(test_predict_leaves_nothing_of_a_third_mass);
+    RUN_TEST(test_predict_leaves_nothing_of_friction_that_builds_up);
+    RUN_TEST(test_predict_leaves_nothing_of_a_belt_that_is_not_linear);
+    RUN_TEST(test_predict_leaves_nothing_of_an_eccentric_encoder_and_of_saturation);
+    RUN_TEST(test_predict_leaves_nothing_of_what_depends_on_time);
+    RUN_TEST(test_predict_runs_on_over_lost_rows);
+    RUN_TEST(test_predict_kinematics_is_what_an_eccentric_encoder_contradicts);
     RUN_TEST(test_predict_gives_missing_torque_in_nm);
     RUN_TEST(test_predict_gives_missing_dead_time_to_the_actuator_channel);
     RUN_TEST(test_predict_from_measured_torque_alone_is_right_where_torque_is_slow);

@@ -112,19 +112,20 @@ static double missed_squares(const struct sim_model *model, const struct run *ru
     const double *velocity = run_column(run, "velocity_rad_per_s");
     const bool rigid = model->structure == sim_structure_rigid;
     const double moved = model->motor_inertia_kgm2 + (rigid ? model->load_inertia_kgm2 : 0.0);
+    struct sim_stepper stepper;
     struct sim_plant plant;
     struct sim_actuator actuator;
     double sum = 0.0;
+    sim_stepper_init(&stepper, model, 1.0 / (run->sample_rate_hz * sim_substeps));
     sim_plant_init(&plant, position[0]);
     sim_actuator_init(&actuator);
     for (size_t n = 0; n + 1 < run->rows; n++) {
         plant.position = position[n];
         plant.velocity = velocity[n];
         sim_actuator_hold(&actuator, torque_ref[n]);
-        const double misplaced = torque[n] - sim_actuator_now(&actuator, model);
+        const double misplaced = torque[n] - sim_actuator_now(&actuator, &stepper);
         for (size_t i = 0; i < sim_substeps; i++) {
-            sim_plant_step(&plant, model, sim_actuator_substep(&actuator, model, i),
-                           1.0 / (run->sample_rate_hz * sim_substeps));
+            sim_plant_move(&plant, &stepper, sim_actuator_substep(&actuator, &stepper, i));
         }
         const double missed = moved * run->sample_rate_hz * (velocity[n + 1] - plant.velocity);
         sum += n >= first ? missed * missed + misplaced * misplaced : 0.0;
