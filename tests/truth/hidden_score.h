@@ -4,25 +4,29 @@
 
 #include "tests/truth/truth_case.h"
 
-enum { SCORE_NAMED_LENGTH = 160 };
+enum { SCORE_TEXT_LENGTH = 160 };
 
-/// What became of one case. Gaps (a figure that the diagnosis did not give) are NaN.
+/// What became of one case.
 enum score_outcome {
     score_right,  ///< exactly the truth, which may be `no_discrepancy` or `unexplained`
     score_tied,   ///< another cause of a stated tie that holds the truth
-    score_missed, ///< said less than the truth: no cause of a catalogued effect, no doubt about an unknown one
-    score_wrong,  ///< a cause that is not there, or the truth with others
+    score_equal,  ///< another set of causes that makes the same motion: no data could tell, the case is at fault
+    score_missed, ///< said less than the truth: not all causes, no doubt about an unknown one, doubt where none is due
+    score_wrong,  ///< a cause that is not there
     score_failed, ///< no diagnosis: exit status, time limit, or an answer that is not in the contract
     score_outcome_count
 };
 
+/// Gaps (a figure that the diagnosis did not give) are NaN.
 struct score {
     enum score_outcome outcome;
-    char named[SCORE_NAMED_LENGTH]; ///< causes joined by "+", else the verdict, else why it failed
-    int names_cause;
-    double evidence_nats;
-    double worst_z;        ///< largest error over stated standard deviation among the true cause's parameters
-    double worst_relative; ///< largest relative error among them
+    char named[SCORE_TEXT_LENGTH]; ///< causes joined by "+", else the verdict, else why it failed
+    char verdict[24];
+    int causes, causes_there; ///< named; and of them in the truth
+    int parameters, parameters_within_3_std;
+    double worst_z; ///< largest error over stated standard deviation among the parameters of true causes
+    char worst_parameter[SCORE_TEXT_LENGTH];
+    double left_nats; ///< expected evidence of the truth over the named causes, where they are not the truth
     double nominal_nrmse, refitted_nrmse, extended_nrmse, floor_nrmse, whitened_rms;
     double seconds;
 };

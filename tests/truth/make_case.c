@@ -7,7 +7,8 @@
 
 static int usage(FILE *out)
 {
-    fprintf(out, "usage: truth_case --seed S --kind K --out DIR [--size X] [--protocol multisine|stroke]\n"
+    fprintf(out, "usage: truth_case --seed S --kind KIND[+KIND[+KIND]] --out DIR [--size clear|moderate|faint]\n"
+                 "       [--protocol multisine|stroke]\n"
                  "Writes run1.csv, run2.csv, nominal.json and truth.json (the answer) into DIR.\nkinds:");
     for (int kind = 0; kind < truth_kind_count; kind++) {
         fprintf(out, " %s", truth_kind_name((enum truth_kind)kind));
@@ -17,27 +18,27 @@ static int usage(FILE *out)
 }
 
 struct request {
-    uint64_t seed;
-    double size;
-    enum truth_kind kind;
-    enum truth_protocol protocol;
+    struct truth_wish wish;
+    int kind_given;
     const char *out;
 };
 
 static int set_option(struct request *self, const char *name, const char *value)
 {
     if (strcmp(name, "--seed") == 0) {
-        self->seed = strtoull(value, NULL, 10);
+        self->wish.seed = strtoull(value, NULL, 10);
     } else if (strcmp(name, "--kind") == 0) {
-        self->kind = truth_kind_find(value);
+        self->kind_given = 1;
+        return truth_wish_read(&self->wish, value);
     } else if (strcmp(name, "--size") == 0) {
-        self->size = strtod(value, NULL);
+        self->wish.size = truth_size_find(value);
+        return self->wish.size == truth_size_count ? -1 : 0;
     } else if (strcmp(name, "--out") == 0) {
         self->out = value;
     } else if (strcmp(name, "--protocol") == 0 && strcmp(value, "multisine") == 0) {
-        self->protocol = truth_protocol_multisine;
+        self->wish.protocol = truth_protocol_multisine;
     } else if (strcmp(name, "--protocol") == 0 && strcmp(value, "stroke") == 0) {
-        self->protocol = truth_protocol_stroke;
+        self->wish.protocol = truth_protocol_stroke;
     } else {
         return -1;
     }
@@ -47,7 +48,7 @@ static int set_option(struct request *self, const char *name, const char *value)
 int main(int argc, char **argv)
 {
     static struct truth_case made;
-    struct request request = {.seed = 1, .size = 1.0, .kind = truth_kind_count, .protocol = truth_protocol_any};
+    struct request request = {.wish = {.seed = 1}};
     if (argc == 2 && strcmp(argv[1], "--help") == 0) {
         return usage(stdout);
     }
@@ -56,9 +57,12 @@ int main(int argc, char **argv)
             return usage(stderr);
         }
     }
-    if (!request.out || request.kind == truth_kind_count || !(request.size > 0.0 && request.size <= 100.0)) {
+    if (!request.out || !request.kind_given) {
         return usage(stderr);
     }
-    truth_case_make(&made, request.seed, request.kind, request.size, request.protocol);
+    truth_case_make(&made, &request.wish);
+    if (!made.reached) {
+        fprintf(stderr, "truth_case: the size could not be reached\n");
+    }
     return truth_case_write(&made, request.out) || truth_case_write_answer(&made, request.out) ? 1 : 0;
 }

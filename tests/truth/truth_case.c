@@ -2,35 +2,70 @@
 #include "tests/truth/truth_case.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "tests/truth/truth_evidence.h"
+
 static const double two_pi = 6.283185307179586476925286766559;
-static const double clear_evidence_nats = 1000.0;
-enum { DRAWS = 60, DRAWS_FREE = 20, COLUMNS_MAX = 4 };
+enum { DRAWS = 40, DRAWS_FREE = 12, SIZE_STEPS = 10 };
 
-static const char *const kind_names[truth_kind_count] = {
-    "clean",     "viscous_friction", "coulomb_friction",  "stribeck_friction", "asymmetric_friction",
-    "load_bias", "inertia",          "belt_elasticity",   "cogging",           "torque_lag",
-    "dead_time", "quadratic_drag",   "position_friction", "torque_constant",
-};
+static const struct {
+    const char *name;
+    double nats;
+} sizes[truth_size_count] = {{"clear", 1e4}, {"moderate", 1e3}, {"faint", 1e2}};
 
-const char *truth_kind_name(enum truth_kind kind)
+const char *truth_size_name(enum truth_size size)
 {
-    return kind_names[kind];
+    return sizes[size].name;
 }
 
-enum truth_kind truth_kind_find(const char *name)
+enum truth_size truth_size_find(const char *name)
 {
-    int kind = 0;
-    while (kind < truth_kind_count && strcmp(kind_names[kind], name) != 0) {
-        kind++;
+    int size = 0;
+    while (size < truth_size_count && strcmp(sizes[size].name, name) != 0) {
+        size++;
     }
-    return (enum truth_kind)kind;
+    return (enum truth_size)size;
 }
 
-int truth_kind_is_catalogued(enum truth_kind kind)
+double truth_size_nats(enum truth_size size)
 {
-    return kind >= truth_kind_viscous_friction && kind <= truth_kind_dead_time;
+    return sizes[size].nats;
+}
+
+void truth_wish_name(const struct truth_wish *wish, char *out, int length)
+{
+    int used = snprintf(out, (size_t)length, "%s", truth_kind_name(wish->causes ? wish->kind[0] : truth_kind_clean));
+    for (int i = 1; i < wish->causes && used < length; i++) {
+        used += snprintf(out + used, (size_t)(length - used), "+%s", truth_kind_name(wish->kind[i]));
+    }
+}
+
+int truth_wish_read(struct truth_wish *self, const char *name)
+{
+    char text[160], *rest = NULL;
+    if (strlen(name) >= sizeof text) {
+        return -1;
+    }
+    memcpy(text, name, strlen(name) + 1);
+    self->causes = 0;
+    for (char *word = strtok_r(text, "+", &rest); word; word = strtok_r(NULL, "+", &rest)) {
+        enum truth_kind kind = truth_kind_find(word);
+        if (kind == truth_kind_count || self->causes == TRUTH_CAUSES_MAX) {
+            return -1;
+        }
+        for (int i = 0; i < self->causes; i++) {
+            if (!truth_kind_goes_with(self->kind[i], kind)) {
+                return -1;
+            }
+        }
+        if (kind != truth_kind_clean) {
+            self->kind[self->causes++] = kind;
+        }
+    }
+    return 0;
 }
 
 static void draw_plant(struct truth_plant_spec *out, int two_mass, struct truth_random *random)
@@ -57,240 +92,105 @@ static void draw_plant(struct truth_plant_spec *out, int two_mass, struct truth_
     }
 }
 
-static void draw_sensors(struct truth_sensors *out, struct truth_random *random)
+// The coarsest encoder whose count is below 1.5 of the noise, so that rounding errors stay white.
+static void set_counts(struct truth_sensors *io)
 {
-    out->position_rad = truth_random_log_uniform(random, 2e-6, 2e-5);
-    out->velocity_rad_per_s = truth_random_log_uniform(random, 5e-4, 5e-3);
-    out->torque_Nm = truth_random_log_uniform(random, 1e-3, 1e-2);
-    // The coarsest encoder whose count is below 1.5 of the noise, so that rounding errors stay white.
-    out->counts_per_rev = 65536.0;
-    while (two_pi / out->counts_per_rev > 1.5 * out->position_rad) {
-        out->counts_per_rev *= 2.0;
+    io->counts_per_rev = 65536.0;
+    while (two_pi / io->counts_per_rev > 1.5 * io->position_rad) {
+        io->counts_per_rev *= 2.0;
     }
 }
 
+static void draw_sensors(struct truth_sensors *out, struct truth_random *random)
+{
+    *out = (struct truth_sensors){
+        .position_rad = truth_random_log_uniform(random, 2e-6, 2e-5),
+        .velocity_rad_per_s = truth_random_log_uniform(random, 5e-4, 5e-3),
+        .torque_Nm = truth_random_log_uniform(random, 1e-3, 1e-2),
+    };
+    set_counts(out);
+}
+
+// One of two levels for the fit, a lower one for the validation; the carriage near the middle or far from it. A stroke
+// is more than a turn in both runs.
 static void draw_excitations(struct truth_case *self, struct truth_random *random)
 {
+    int loud = truth_random_integer(random, 0, 1), far = truth_random_integer(random, 0, 2) == 0;
+    int stroke = self->protocol == truth_protocol_stroke;
     struct truth_excitation_wish wish = {
-        .inertia_kgm2 = self->truth.motor_inertia_kgm2 + self->truth.load_inertia_kgm2,
-        .torque_rms_Nm = truth_random_uniform(random, 0.3, 0.7),
+        .inertia_kgm2 = self->base.plant.motor_inertia_kgm2 + self->base.plant.load_inertia_kgm2,
+        .torque_rms_Nm = loud ? truth_random_uniform(random, 0.45, 0.8) : truth_random_uniform(random, 0.25, 0.45),
         .speed_max_rad_per_s = truth_random_uniform(random, 1.2, 3.0),
         .corner_hz = truth_random_log_uniform(random, 2.0, 15.0),
-        .stroke_rad = self->protocol == truth_protocol_stroke ? truth_random_uniform(random, 1.5, 4.0) : 0.0,
-        .centre_rad = truth_random_uniform(random, -1.5, 1.5),
+        .stroke_rad = stroke ? truth_random_uniform(random, 3.2, 4.2) : 0.0,
+        .centre_rad = (far ? 4.0 : 0.0) * truth_random_sign(random) + truth_random_uniform(random, -1.5, 1.5),
     };
     truth_excitation_make(&self->fit, &wish, random);
     wish.torque_rms_Nm *= 0.8;
     wish.speed_max_rad_per_s *= 0.8;
-    wish.stroke_rad *= 0.8;
+    wish.stroke_rad *= 0.985;
     truth_excitation_make(&self->validation, &wish, random);
-    self->truth.coulomb_origin_rad = wish.centre_rad;
+    self->base.plant.coulomb_origin_rad = wish.centre_rad;
 }
 
-// Root mean square of f(v) = |v|^power over the reference of the fit run, in units of the column.
-static double rms_of(const double *column, double power)
+// Root mean square of |x|^power.
+static double rms_of(const double *column, double offset, double power)
 {
     double sum = 0.0;
     for (int n = 0; n < TRUTH_PERIOD_SAMPLES; n++) {
-        sum += pow(fabs(column[n]), 2.0 * power);
+        sum += pow(fabs(column[n] - offset), 2.0 * power);
     }
     return sqrt(sum / TRUTH_PERIOD_SAMPLES);
 }
 
-static double changed_value(double value, double size, struct truth_random *random)
+static void measure_setting(struct truth_case *self)
 {
-    int absent = truth_random_integer(random, 0, 2) == 0;
-    double change = truth_random_uniform(random, 0.3, 0.8) * truth_random_sign(random);
-    return absent ? value * fmax(0.0, 1.0 - size) : value / (1.0 + fmax(-0.8, change * size));
-}
-
-static void hide_friction(struct truth_case *self, struct truth_random *random)
-{
-    struct truth_plant_spec *truth = &self->truth;
-    switch (self->kind) {
-    case truth_kind_viscous_friction:
-        self->without.viscous_friction_Nms_per_rad =
-            changed_value(truth->viscous_friction_Nms_per_rad, self->size, random);
-        break;
-    case truth_kind_coulomb_friction:
-        self->without.coulomb_friction_Nm = changed_value(truth->coulomb_friction_Nm, self->size, random);
-        break;
-    case truth_kind_stribeck_friction:
-        truth->stribeck_excess_Nm = self->size * truth_random_uniform(random, 0.015, 0.05);
-        truth->stribeck_velocity_rad_per_s = truth_random_uniform(random, 0.1, 0.5);
-        break;
-    case truth_kind_asymmetric_friction:
-        truth->asymmetry_ratio =
-            fmax(-0.9, fmin(0.9, self->size * truth_random_uniform(random, 0.1, 0.35) * truth_random_sign(random)));
-        break;
-    default:
-        truth->bias_Nm = self->size * truth_random_uniform(random, 0.01, 0.08) * truth_random_sign(random);
-        break;
+    const struct truth_plant_spec *plant = &self->base.plant;
+    double inertia = plant->motor_inertia_kgm2 + plant->load_inertia_kgm2, peak = 0.0;
+    for (int n = 0; n < TRUTH_PERIOD_SAMPLES; n++) {
+        peak = fmax(peak, inertia * fabs(self->fit.acceleration_rad_per_s2[n]));
+    }
+    double acceleration = rms_of(self->fit.acceleration_rad_per_s2, 0.0, 1.0);
+    double range = fmin(truth_excitation_range_rad(&self->fit), truth_excitation_range_rad(&self->validation));
+    self->setting = (struct truth_setting){
+        .range_rad = range,
+        .centre_rad = plant->coulomb_origin_rad,
+        .duration_s = (double)self->periods * TRUTH_PERIOD_SAMPLES / TRUTH_RATE_HZ,
+        .torque_rms_Nm = inertia * acceleration,
+        .torque_peak_Nm = peak + plant->coulomb_friction_Nm,
+        .square_speed_rms = rms_of(self->fit.velocity_rad_per_s, 0.0, 2.0),
+        .cube_torque_rms = pow(inertia, 3.0) * rms_of(self->fit.acceleration_rad_per_s2, 0.0, 3.0),
+        .away_rms_rad = rms_of(self->fit.position_rad, plant->coulomb_origin_rad, 1.0),
+    };
+    if (plant->two_mass) {
+        self->setting.twist_rms_rad = plant->load_inertia_kgm2 * acceleration / plant->belt_stiffness_Nm_per_rad;
     }
 }
 
-static void hide_mechanics(struct truth_case *self, struct truth_random *random)
+struct truth_drive truth_case_drive(const struct truth_case *self, unsigned known)
 {
-    struct truth_plant_spec *truth = &self->truth;
-    if (self->kind == truth_kind_inertia) {
-        double change = self->size * truth_random_uniform(random, 0.15, 0.4) * truth_random_sign(random);
-        self->without.load_inertia_kgm2 = truth->load_inertia_kgm2 / (1.0 + fmax(-0.8, change));
-    } else if (self->kind == truth_kind_belt_elasticity) {
-        truth->belt_stiffness_Nm_per_rad /= self->size;
-        self->without.two_mass = 0;
-        self->without.belt_stiffness_Nm_per_rad = self->without.belt_damping_Nms_per_rad = 0.0;
-    } else {
-        double range = fmin(truth_excitation_range_rad(&self->fit), truth_excitation_range_rad(&self->validation));
-        int fewest = (int)ceil(2.0 * two_pi / range);
-        truth->cogging_amplitude_Nm = self->size * truth_random_uniform(random, 0.01, 0.05);
-        truth->cogging_periods_per_rev =
-            truth_random_integer(random, fewest > 6 ? fewest : 6, fewest > 60 ? fewest : 60);
-        truth->cogging_phase_rad = truth_random_uniform(random, 0.0, two_pi);
+    struct truth_drive drive = self->base;
+    for (int i = 0; i < self->wish.causes; i++) {
+        truth_kind_apply(&self->hidden[i], &self->setting, (known >> i) & 1u, &drive);
     }
+    // A bristle is as fast as the speed over its distance; a contact begins in the middle of a step.
+    if (drive.plant.load_coulomb_Nm != 0.0 || drive.plant.gap_rad > 0.0 ||
+        (drive.plant.presliding_distance_rad > 0.0 && drive.plant.presliding_distance_rad < 2e-3)) {
+        drive.plant.step_s = 10e-6;
+    }
+    return drive;
 }
 
-static void hide_actuator(struct truth_case *self, struct truth_random *random)
+static unsigned all_known(const struct truth_case *self)
 {
-    if (self->kind == truth_kind_torque_lag) {
-        double factor = 1.0 + self->size * truth_random_uniform(random, 0.5, 2.0);
-        self->without.torque_lag_s *= truth_random_sign(random) > 0.0 ? factor : 1.0 / factor;
-    } else {
-        self->truth.dead_time_s += self->size * truth_random_uniform(random, 0.3e-3, 1.5e-3);
-    }
+    return (1u << self->wish.causes) - 1u;
 }
 
-// Sized so that the unknown term is 3 to 8 % of the inertia's torque.
-static void hide_unknown(struct truth_case *self, struct truth_random *random)
+static void compose(struct truth_case *self)
 {
-    struct truth_plant_spec *truth = &self->truth;
-    double inertia = truth->motor_inertia_kgm2 + truth->load_inertia_kgm2;
-    double torque_rms = inertia * rms_of(self->fit.acceleration_rad_per_s2, 1.0);
-    double wanted = self->size * truth_random_uniform(random, 0.03, 0.08) * torque_rms;
-    if (self->kind == truth_kind_quadratic_drag) {
-        truth->quadratic_drag_Nms2_per_rad2 = wanted / rms_of(self->fit.velocity_rad_per_s, 2.0);
-    } else if (self->kind == truth_kind_position_friction) {
-        double away[TRUTH_PERIOD_SAMPLES];
-        for (int n = 0; n < TRUTH_PERIOD_SAMPLES; n++) {
-            away[n] = self->fit.position_rad[n] - truth->coulomb_origin_rad;
-        }
-        double at_ends = self->size * truth_random_uniform(random, 0.4, 0.8);
-        truth->coulomb_slope_per_rad =
-            truth_random_sign(random) * fmin(0.9, at_ends) / (0.5 * truth_excitation_range_rad(&self->fit));
-        // Friction at the middle that makes the slope's share as wanted, within what such a drive may have.
-        double middle = wanted / (fabs(truth->coulomb_slope_per_rad) * rms_of(away, 1.0));
-        truth->coulomb_friction_Nm = self->without.coulomb_friction_Nm = fmin(0.12, fmax(0.04, middle));
-    } else {
-        double cube = pow(inertia, 3.0) * rms_of(self->fit.acceleration_rad_per_s2, 3.0);
-        double peak = 0.0;
-        for (int n = 0; n < TRUTH_PERIOD_SAMPLES; n++) {
-            peak = fmax(peak, inertia * fabs(self->fit.acceleration_rad_per_s2[n]));
-        }
-        // T (1 - c T^2) must still grow at the peak, with room for what the loop adds.
-        truth->torque_saturation_per_Nm2 = fmin(wanted / cube, 0.15 / (peak * peak));
-    }
-}
-
-static void hide(struct truth_case *self, struct truth_random *random)
-{
-    self->without = self->truth;
-    switch (self->kind) {
-    case truth_kind_inertia:
-    case truth_kind_belt_elasticity:
-    case truth_kind_cogging:
-        hide_mechanics(self, random);
-        break;
-    case truth_kind_torque_lag:
-    case truth_kind_dead_time:
-        hide_actuator(self, random);
-        break;
-    case truth_kind_quadratic_drag:
-    case truth_kind_position_friction:
-    case truth_kind_torque_constant:
-        hide_unknown(self, random);
-        break;
-    case truth_kind_clean:
-    case truth_kind_count:
-        break;
-    default:
-        hide_friction(self, random);
-        break;
-    }
-}
-
-// The torque that the model lacks at sample n of the fit run's reference motion.
-static double missing_Nm(const struct truth_case *self, int n)
-{
-    double x = self->fit.position_rad[n], v = self->fit.velocity_rad_per_s[n];
-    double a = self->fit.acceleration_rad_per_s2[n];
-    const struct truth_plant_spec *truth = &self->truth, *without = &self->without;
-    double inertia = truth->motor_inertia_kgm2 + truth->load_inertia_kgm2;
-    double more = inertia - without->motor_inertia_kgm2 - without->load_inertia_kgm2;
-    double torque = inertia * a;
-    int s = v < 0.0 ? -1 : 1;
-    return more * a + truth->torque_saturation_per_Nm2 * torque * torque * torque +
-           truth_plant_resistance_Nm(truth, x, v, s) - truth_plant_resistance_Nm(without, x, v, s);
-}
-
-// Root mean square of the missing torque that inertia, friction and bias of the refitted model cannot take up.
-static double unexplained_rms_Nm(const struct truth_case *self)
-{
-    static const enum truth_kind owner[COLUMNS_MAX] = {truth_kind_inertia, truth_kind_viscous_friction,
-                                                       truth_kind_coulomb_friction, truth_kind_load_bias};
-    double basis[COLUMNS_MAX][TRUTH_PERIOD_SAMPLES], rest[TRUTH_PERIOD_SAMPLES], sum = 0.0;
-    int used = 0;
-    for (int column = 0; column <= COLUMNS_MAX; column++) {
-        // The parameter that is wrong is not free in the model it is compared with.
-        if (column < COLUMNS_MAX && owner[column] == self->kind) {
-            continue;
-        }
-        double *target = column < COLUMNS_MAX ? basis[used] : rest;
-        for (int n = 0; n < TRUTH_PERIOD_SAMPLES; n++) {
-            double v = self->fit.velocity_rad_per_s[n];
-            const double value[COLUMNS_MAX + 1] = {self->fit.acceleration_rad_per_s2[n], v, v < 0.0 ? -1.0 : 1.0, 1.0,
-                                                   missing_Nm(self, n)};
-            target[n] = value[column];
-        }
-        for (int i = 0; i < used; i++) {
-            double dot = 0.0;
-            for (int n = 0; n < TRUTH_PERIOD_SAMPLES; n++) {
-                dot += basis[i][n] * target[n];
-            }
-            for (int n = 0; n < TRUTH_PERIOD_SAMPLES; n++) {
-                target[n] -= dot * basis[i][n];
-            }
-        }
-        sum = 0.0;
-        for (int n = 0; n < TRUTH_PERIOD_SAMPLES; n++) {
-            sum += target[n] * target[n];
-        }
-        for (int n = 0; column < COLUMNS_MAX && n < TRUTH_PERIOD_SAMPLES; n++) {
-            target[n] /= sqrt(sum);
-        }
-        used += column < COLUMNS_MAX;
-    }
-    return sqrt(sum / TRUTH_PERIOD_SAMPLES);
-}
-
-// Evidence = samples (rms / noise)^2 / 2, with the noise that a torque from a measured motion has at 30 Hz. A rough
-// figure, on the low side for what happens below 30 Hz. The actuator's effects are seen directly between two columns.
-static double expected_evidence(const struct truth_case *self)
-{
-    const struct truth_plant_spec *truth = &self->truth, *without = &self->without;
-    double inertia = truth->motor_inertia_kgm2 + truth->load_inertia_kgm2;
-    double samples = (double)(self->periods - 1) * TRUTH_PERIOD_SAMPLES;
-    double from_velocity = inertia * self->sensors.velocity_rad_per_s * two_pi * 30.0;
-    double noise = hypot(hypot(self->sensors.torque_Nm, truth->process_noise_Nm), from_velocity);
-    double rms = unexplained_rms_Nm(self);
-    if (self->kind == truth_kind_torque_lag || self->kind == truth_kind_dead_time) {
-        double late = fabs(truth->torque_lag_s - without->torque_lag_s) + truth->dead_time_s - without->dead_time_s;
-        // Torque lines are flat to 100 Hz: the mean square of a torque's slope is (2 pi 100)^2 / 3 of its own.
-        rms = late * inertia * rms_of(self->fit.acceleration_rad_per_s2, 1.0) * two_pi * 100.0 / sqrt(3.0);
-        noise = self->sensors.torque_Nm;
-    } else if (self->kind == truth_kind_belt_elasticity) {
-        // Around the antiresonance a rigid model is wrong by the whole torque, over about a fifth of the band.
-        rms = 0.4 * inertia * rms_of(self->fit.acceleration_rad_per_s2, 1.0);
-    }
-    return 0.5 * samples * (rms / noise) * (rms / noise);
+    self->truth = truth_case_drive(self, all_known(self));
+    self->without = truth_case_drive(self, 0u).plant;
+    truth_controller_tune(&self->controller, &self->truth.plant, self->position_gain_per_s);
 }
 
 static double off_by(double value, double ratio, struct truth_random *random)
@@ -312,73 +212,241 @@ static void draw_nominal(struct truth_case *self, struct truth_random *random)
     nominal->belt_damping_Nms_per_rad = off_by(nominal->belt_damping_Nms_per_rad, 0.02, random);
 }
 
-static void state_answer(struct truth_case *self)
+static void draw_case(struct truth_case *self, int draw, struct truth_random *random)
 {
-    const struct truth_plant_spec *truth = &self->truth;
-    const struct truth_parameter answers[truth_kind_count][TRUTH_PARAMETERS_MAX] = {
-        [truth_kind_viscous_friction] = {{"viscous_friction_Nms_per_rad", truth->viscous_friction_Nms_per_rad, 0}},
-        [truth_kind_coulomb_friction] = {{"coulomb_friction_Nm", truth->coulomb_friction_Nm, 0}},
-        [truth_kind_stribeck_friction] = {{"stribeck_excess_Nm", truth->stribeck_excess_Nm, 0},
-                                          {"stribeck_velocity_rad_per_s", truth->stribeck_velocity_rad_per_s, 0}},
-        [truth_kind_asymmetric_friction] = {{"asymmetry_ratio", truth->asymmetry_ratio, 0}},
-        [truth_kind_load_bias] = {{"bias_Nm", truth->bias_Nm, 1}},
-        [truth_kind_inertia] = {{"load_inertia_kgm2", truth->load_inertia_kgm2, 0}},
-        [truth_kind_belt_elasticity] = {{"belt_stiffness_Nm_per_rad", truth->belt_stiffness_Nm_per_rad, 0}},
-        [truth_kind_cogging] = {{"amplitude_Nm", truth->cogging_amplitude_Nm, 1},
-                                {"periods_per_rev", truth->cogging_periods_per_rev, 0}},
-        [truth_kind_torque_lag] = {{"torque_lag_s", truth->torque_lag_s, 0}},
-        [truth_kind_dead_time] = {{"dead_time_s", truth->dead_time_s, 0}},
-        [truth_kind_quadratic_drag] = {{"quadratic_drag_Nms2_per_rad2", truth->quadratic_drag_Nms2_per_rad2, 0}},
-        [truth_kind_position_friction] = {{"coulomb_slope_per_rad", truth->coulomb_slope_per_rad, 0},
-                                          {"coulomb_origin_rad", truth->coulomb_origin_rad, 0}},
-        [truth_kind_torque_constant] = {{"torque_saturation_per_Nm2", truth->torque_saturation_per_Nm2, 0}},
-    };
-    self->parameters = 0;
-    while (self->parameters < TRUTH_PARAMETERS_MAX && answers[self->kind][self->parameters].name) {
-        self->parameter[self->parameters] = answers[self->kind][self->parameters];
-        self->parameters++;
+    int needs_belt = 0, needs_stroke = 0, coin = truth_random_integer(random, 0, 1);
+    for (int i = 0; i < self->wish.causes; i++) {
+        needs_belt |= truth_kind_needs_belt(self->wish.kind[i]);
+        needs_stroke |= truth_kind_needs_stroke(self->wish.kind[i]);
     }
-}
-
-// Whether a drawn case shows its effect. Cogging needs two of its periods under the motion.
-static int shows(const struct truth_case *self)
-{
-    if (self->kind == truth_kind_clean) {
-        return 1;
-    }
-    if (self->kind == truth_kind_cogging && self->truth.cogging_periods_per_rev > 60.0) {
-        return 0;
-    }
-    return self->expected_evidence_nats >= clear_evidence_nats * self->size * self->size;
-}
-
-void truth_case_make(struct truth_case *self, uint64_t seed, enum truth_kind kind, double size,
-                     enum truth_protocol protocol)
-{
-    *self = (struct truth_case){.kind = kind, .seed = seed, .size = size};
-    struct truth_random random;
-    truth_random_init(&random, seed, 1000u + (uint64_t)kind);
-    for (int draw = 0; draw < DRAWS; draw++) {
-        int coin = truth_random_integer(&random, 0, 1);
-        self->protocol = protocol != truth_protocol_any    ? protocol
-                         : draw >= DRAWS_FREE || coin != 0 ? truth_protocol_stroke
-                                                           : truth_protocol_multisine;
-        self->periods = truth_random_integer(&random, 0, 1) ? 11 : 7;
-        int two_mass = truth_random_integer(&random, 0, 1) || kind == truth_kind_belt_elasticity;
-        draw_plant(&self->truth, two_mass, &random);
-        draw_sensors(&self->sensors, &random);
-        draw_excitations(self, &random);
-        hide(self, &random);
-        self->expected_evidence_nats = kind == truth_kind_clean ? 0.0 : expected_evidence(self);
-        if (shows(self)) {
-            break;
+    self->protocol = self->wish.protocol != truth_protocol_any                               ? self->wish.protocol
+                     : needs_stroke || (coin && draw < DRAWS_FREE) || draw >= 2 * DRAWS_FREE ? truth_protocol_stroke
+                                                                                             : truth_protocol_multisine;
+    self->periods = truth_random_integer(random, 0, 1) ? 11 : 7;
+    draw_plant(&self->base.plant, truth_random_integer(random, 0, 1) || needs_belt, random);
+    draw_sensors(&self->base.sensors, random);
+    draw_excitations(self, random);
+    measure_setting(self);
+    for (int i = 0; i < self->wish.causes; i++) {
+        self->hidden[i] = (struct truth_hidden){.kind = self->wish.kind[i], .amount = 1.0};
+        for (int k = 0; k < TRUTH_DRAWS; k++) {
+            self->hidden[i].draws[k] = truth_random_uniform(random, 0.0, 1.0);
         }
     }
+    self->position_gain_per_s = truth_random_uniform(random, 40.0, 80.0);
+    self->controller = (struct truth_controller){.late_samples = truth_random_integer(random, 0, 1)};
+    self->controller.inertia_kgm2 = self->setting.torque_rms_Nm / rms_of(self->fit.acceleration_rad_per_s2, 0.0, 1.0);
+}
+
+uint64_t truth_case_noise_seed(const struct truth_case *self)
+{
+    uint64_t kind = self->wish.causes ? (uint64_t)self->wish.kind[0] : 0u;
+    return 2u * (self->wish.seed * 64u + kind);
+}
+
+// Values that are no longer the given model's own to refit: those of the effect, and what would stand in for it.
+static unsigned not_free(enum truth_kind kind)
+{
+    switch (kind) {
+    case truth_kind_viscous_friction:
+        return 1u << truth_refit_viscous;
+    case truth_kind_coulomb_friction:
+        return 1u << truth_refit_coulomb;
+    case truth_kind_inertia: // the motor's share may move by a few percent only
+        return 1u << truth_refit_load_inertia | 1u << truth_refit_motor_inertia;
+    case truth_kind_torque_lag:
+    case truth_kind_dead_time:
+        return 1u << truth_refit_lag | 1u << truth_refit_dead_time;
+    default:
+        return 0u;
+    }
+}
+
+static int find_evidence(struct truth_case *self, struct truth_evidence *scratch, int keep_basis)
+{
+    unsigned fixed = 0u;
+    int aperiodic = 0, status = 0;
+    for (int i = 0; i < self->wish.causes; i++) {
+        fixed |= not_free(self->wish.kind[i]);
+        aperiodic |= truth_kind_is_aperiodic(self->wish.kind[i]) && self->wish.kind[i] != truth_kind_lost_samples;
+    }
+    const struct truth_evidence_setting setting = {
+        &self->controller, &self->fit, self->periods, truth_case_noise_seed(self), fixed, aperiodic, keep_basis};
+    for (int i = 0; i < self->wish.causes && !status; i++) {
+        struct truth_drive other = truth_case_drive(self, all_known(self) & ~(1u << i));
+        truth_kind_refit(self->wish.kind[i], &self->truth.plant, &other.plant);
+        status = truth_evidence_find(&self->truth, &other, &setting, &scratch[i]);
+        self->evidence_nats[i] = scratch[i].nats;
+        self->share[i] = scratch[i].share;
+        if (self->wish.kind[i] == truth_kind_lost_samples) {
+            double rows = self->truth.sensors.lost_share * self->periods * TRUTH_PERIOD_SAMPLES;
+            self->evidence_nats[i] = truth_evidence_of_loss_nats(&self->truth.sensors, rows);
+        }
+    }
+    self->unlike = 1.0;
+    for (int i = 0; i < self->wish.causes && !status; i++) {
+        for (int k = 0; k < i; k++) {
+            double likeness = truth_evidence_likeness(&scratch[i], &scratch[k]);
+            self->unlike = fmin(self->unlike, 1.0 - likeness * likeness);
+        }
+    }
+    return status;
+}
+
+double truth_case_left_nats(const struct truth_case *self, const struct truth_drive *other)
+{
+    const struct truth_evidence_setting setting = {
+        &self->controller, &self->fit, self->periods, truth_case_noise_seed(self), 0u, 1, 0};
+    struct truth_evidence *evidence = malloc(sizeof *evidence);
+    double nats = NAN;
+    if (evidence && !truth_evidence_find(&self->truth, other, &setting, evidence)) {
+        nats = evidence->nats;
+    }
+    free(evidence);
+    return nats;
+}
+
+static void scale_noise(struct truth_case *self, double factor)
+{
+    self->base.plant.process_noise_Nm *= factor;
+    self->base.sensors.torque_Nm *= factor;
+    self->base.sensors.velocity_rad_per_s *= factor;
+    self->base.sensors.position_rad *= factor;
+    set_counts(&self->base.sensors);
+}
+
+// What is known of how an effect's evidence grows with its amount: a bracket, in logarithms.
+struct bracket {
+    double low, high, last_amount, last_nats, slope;
+};
+
+// The next amount to try; evidence usually grows with the square.
+static double next_amount(struct bracket *self, double amount, double nats, double target)
+{
+    double x = log(amount), y = log(fmax(nats, 1e-3));
+    if (nats < target) {
+        self->low = fmax(self->low, x);
+    } else {
+        self->high = fmin(self->high, x);
+    }
+    if (self->last_nats > 0.0 && fabs(x - self->last_amount) > 1e-3) {
+        self->slope = fmin(6.0, fmax(0.7, (y - log(self->last_nats)) / (x - self->last_amount)));
+    }
+    self->last_amount = x;
+    self->last_nats = fmax(nats, 1e-3);
+    double next = x + fmin(2.0, fmax(-2.0, (log(target) - y) / self->slope));
+    if (next >= self->high) {
+        next = 0.5 * (fmax(self->low, x - 2.0) + self->high);
+    } else if (next <= self->low) {
+        next = 0.5 * (self->low + fmin(self->high, x + 2.0));
+    }
+    return exp(next);
+}
+
+static double mean_log_ratio(const struct truth_case *self, double target)
+{
+    double sum = 0.0;
+    for (int i = 0; i < self->wish.causes; i++) {
+        sum += log(fmax(1e-3, self->evidence_nats[i]) / target) / self->wish.causes;
+    }
+    return sum;
+}
+
+// Sizes of one effect are met within a factor of 1.6; several have at least half of theirs each, and 30 times at most.
+static int sizes_fit(const struct truth_case *self, double target)
+{
+    const double alike = 0.3, seen = 0.002;
+    int several = self->wish.causes > 1, fit = self->unlike >= alike;
+    for (int i = 0; i < self->wish.causes; i++) {
+        enum truth_kind kind = self->wish.kind[i];
+        double ratio = self->evidence_nats[i] / target;
+        int in_torque = kind != truth_kind_lost_samples && kind != truth_kind_encoder_eccentricity &&
+                        kind != truth_kind_sensor_filter;
+        fit &= ratio <= (several ? 30.0 : 1.6) && ratio >= 1.0 / (several ? 2.0 : 1.6);
+        fit &= self->share[i] >= seen || !in_torque;
+    }
+    return fit;
+}
+
+// What the amounts could not do is left to the noise, by a factor of 6 at most.
+static int reach_by_noise(struct truth_case *self, struct truth_evidence *scratch, double target)
+{
+    const double most = 6.0;
+    double ratio = mean_log_ratio(self, target), factor = exp(0.5 * ratio);
+    if (!(factor <= most && factor >= 1.0 / most)) {
+        return 0;
+    }
+    if (self->wish.causes == 1 && fabs(ratio) > 0.1) {
+        scale_noise(self, factor);
+    }
+    compose(self);
+    return !find_evidence(self, scratch, 1) && sizes_fit(self, target);
+}
+
+// One more try at the amounts: 1 when they are right or cannot change any more, 0 when not, -1 when the drive fails.
+static int step_amounts(struct truth_case *self, struct truth_evidence *scratch, struct bracket *brackets,
+                        double target, int step)
+{
+    const double first_noise = 6.0;
+    int settled = 1;
+    compose(self);
+    if (find_evidence(self, scratch, step > 0)) {
+        return -1;
+    }
+    if (step == 0) {
+        scale_noise(self, fmin(first_noise, fmax(1.0 / first_noise, exp(0.5 * mean_log_ratio(self, target)))));
+        return 0;
+    }
+    for (int i = 0; i < self->wish.causes; i++) {
+        double before = self->hidden[i].amount, ratio = log(fmax(1e-3, self->evidence_nats[i]) / target);
+        int close = self->wish.causes > 1 ? ratio > -0.4 && ratio < 3.0 : fabs(ratio) < 0.15;
+        if (!close) {
+            self->hidden[i].amount = next_amount(&brackets[i], before, self->evidence_nats[i], target);
+            settled &= fabs(log(self->hidden[i].amount / before)) < 0.03;
+        }
+    }
+    return settled;
+}
+
+// Change the noise, then the amounts, then the noise, until each effect has the evidence asked for. Whether it has.
+static int reach_size(struct truth_case *self)
+{
+    struct truth_evidence *scratch = malloc(TRUTH_CAUSES_MAX * sizeof *scratch);
+    struct bracket brackets[TRUTH_CAUSES_MAX];
+    double target = truth_size_nats(self->wish.size);
+    int settled = scratch ? 0 : -1;
+    for (int i = 0; i < self->wish.causes; i++) {
+        double low, high;
+        truth_kind_bounds(self->wish.kind[i], &low, &high);
+        brackets[i] = (struct bracket){.low = log(low), .high = log(high), .slope = 2.0};
+        // Any amount, with the noise that makes it as plain as asked for; what noise may not do, the amount does.
+        self->hidden[i].amount = low * pow(high / low, 0.1 + 0.8 * self->hidden[i].draws[TRUTH_DRAWS - 1]);
+    }
+    for (int step = 0; !settled && step < SIZE_STEPS; step++) {
+        settled = step_amounts(self, scratch, brackets, target, step);
+    }
+    int reached = settled >= 0 && reach_by_noise(self, scratch, target);
+    free(scratch);
+    return reached;
+}
+
+void truth_case_make(struct truth_case *self, const struct truth_wish *wish)
+{
+    *self = (struct truth_case){.wish = *wish};
+    struct truth_random random;
+    uint64_t stream = 1000u + (uint64_t)wish->size;
+    for (int i = 0; i < wish->causes; i++) {
+        stream = stream * 64u + (uint64_t)wish->kind[i];
+    }
+    truth_random_init(&random, wish->seed, stream);
+    for (int draw = 0; draw < DRAWS && !self->reached; draw++) {
+        draw_case(self, draw, &random);
+        int room = 1;
+        for (int i = 0; i < wish->causes; i++) {
+            room &= truth_kind_has_room(wish->kind[i], &self->setting);
+        }
+        self->reached = wish->causes == 0 || (room && reach_size(self));
+        compose(self);
+    }
     draw_nominal(self, &random);
-    self->controller = (struct truth_controller){
-        .inertia_kgm2 = self->nominal.motor_inertia_kgm2 + self->nominal.load_inertia_kgm2,
-        .late_samples = truth_random_integer(&random, 0, 1),
-    };
-    truth_controller_tune(&self->controller, &self->truth, truth_random_uniform(&random, 40.0, 80.0));
-    state_answer(self);
 }

@@ -2,67 +2,63 @@
 #ifndef TRUTH_CASE_H
 #define TRUTH_CASE_H
 
-#include "tests/truth/truth_run.h"
-
-/// A hidden effect: a drive, a nominal model of it that lacks the effect (and is off by a few percent besides), a run
-/// to fit and a run to validate, and the answer. The kinds up to truth_kind_dead_time are named like the cause they
-/// hide.
-enum truth_kind {
-    truth_kind_clean,
-    truth_kind_viscous_friction,
-    truth_kind_coulomb_friction,
-    truth_kind_stribeck_friction,
-    truth_kind_asymmetric_friction,
-    truth_kind_load_bias,
-    truth_kind_inertia,
-    truth_kind_belt_elasticity,
-    truth_kind_cogging,
-    truth_kind_torque_lag,
-    truth_kind_dead_time,
-    truth_kind_quadratic_drag,    ///< not in the catalogue: q v |v|
-    truth_kind_position_friction, ///< not in the catalogue: Coulomb friction that grows along the travel
-    truth_kind_torque_constant,   ///< not in the catalogue: real torque = T (1 - c T^2), the torque column shows T
-    truth_kind_count
-};
+#include "tests/truth/truth_kind.h"
 
 enum truth_protocol { truth_protocol_any, truth_protocol_multisine, truth_protocol_stroke };
 
-enum { TRUTH_PARAMETERS_MAX = 3 };
+/// How plain the effects are: expected evidence of about 1e4, 1e3, 1e2 nats for each.
+enum truth_size { truth_size_clear, truth_size_moderate, truth_size_faint, truth_size_count };
 
-struct truth_parameter {
-    const char *name;
-    double value;
-    int sign_free; ///< its sign is a matter of convention: compare sizes
+enum { TRUTH_CAUSES_MAX = 3 };
+
+/// What is hidden, and how: enough to make the case again.
+struct truth_wish {
+    uint64_t seed;
+    enum truth_size size;
+    enum truth_protocol protocol;
+    int causes; ///< 0: clean
+    enum truth_kind kind[TRUTH_CAUSES_MAX];
 };
 
+/// A drive, a nominal model of it that lacks the hidden effects (and is off by a few percent besides), a run to fit and
+/// a run to validate, and the answer.
 struct truth_case {
-    enum truth_kind kind;
-    uint64_t seed;
-    double size;
+    struct truth_wish wish;
     enum truth_protocol protocol;
     int periods;
-    struct truth_plant_spec truth;   ///< the drive
-    struct truth_plant_spec without; ///< the drive without the effect
+    struct truth_hidden hidden[TRUTH_CAUSES_MAX];
+    double evidence_nats[TRUTH_CAUSES_MAX]; ///< expected: truth over the model that lacks this effect, refitted
+    double share[TRUTH_CAUSES_MAX];         ///< RMS of the torque that this effect makes, over the torque's
+    double unlike;                          ///< share of an effect's evidence that the others cannot take up, the least
+    int reached;                            ///< whether the size was, within a factor of 1.6
+    struct truth_setting setting;
+    struct truth_drive base;         ///< the drive before anything is hidden in it
+    struct truth_drive truth;        ///< with all effects
+    struct truth_plant_spec without; ///< what is believed: without them
     struct truth_plant_spec nominal; ///< what is given to the diagnosis: `without`, a few percent off
     struct truth_controller controller;
-    struct truth_sensors sensors;
+    double position_gain_per_s;
     struct truth_excitation fit, validation;
-    double expected_evidence_nats; ///< rough log-likelihood ratio of the truth over the refitted nominal
-    int parameters;
-    struct truth_parameter parameter[TRUTH_PARAMETERS_MAX];
 };
 
-const char *truth_kind_name(enum truth_kind kind);
-/// The kind of that name, or truth_kind_count.
-enum truth_kind truth_kind_find(const char *name);
-/// Whether the effect is one that the diagnosis can name.
-int truth_kind_is_catalogued(enum truth_kind kind);
+const char *truth_size_name(enum truth_size size);
+enum truth_size truth_size_find(const char *name);
+double truth_size_nats(enum truth_size size);
 
-/// Draw a case: same arguments, same case, bit for bit. `size` scales the effect; at 1 the expected evidence is at
-/// least 1000 nats (drawn again until it is; the protocol goes to the stroke when the pure multisine cannot show it,
-/// unless one is asked for).
-void truth_case_make(struct truth_case *self, uint64_t seed, enum truth_kind kind, double size,
-                     enum truth_protocol protocol);
+/// The kinds joined by "+", or "clean".
+void truth_wish_name(const struct truth_wish *wish, char *out, int length);
+/// Read what truth_wish_name writes. Returns 0, or -1.
+int truth_wish_read(struct truth_wish *self, const char *name);
+
+/// Draw a case: same wish, same case, bit for bit. Drawn again until each effect has the evidence that its size asks
+/// for (at most 40 times; `reached` tells).
+void truth_case_make(struct truth_case *self, const struct truth_wish *wish);
+/// The drive of a case with the effects whose bit is in `known`; the others as they are believed to be.
+struct truth_drive truth_case_drive(const struct truth_case *self, unsigned known);
+/// Expected evidence, in the fit run, of the truth over another drive, the given model's numbers of which are refitted.
+double truth_case_left_nats(const struct truth_case *self, const struct truth_drive *other);
+/// Seed of the noise of the fit run; the validation run's is one more.
+uint64_t truth_case_noise_seed(const struct truth_case *self);
 /// Write run1.csv, run2.csv and nominal.json into `directory`, which is made if missing.
 /// Returns 0, or -1 with a line on stderr.
 int truth_case_write(const struct truth_case *self, const char *directory);

@@ -24,18 +24,35 @@ static void write_model(const struct truth_plant_spec *spec, FILE *file)
     fprintf(file, "  \"pulley_radius_m\": 0.0159,\n  \"sample_rate_hz\": %d\n}\n", TRUTH_RATE_HZ);
 }
 
+static void write_causes(const struct truth_case *self, FILE *file)
+{
+    fprintf(file, "  \"causes\": [");
+    for (int i = 0; i < self->wish.causes; i++) {
+        struct truth_parameter parameters[TRUTH_PARAMETERS_MAX];
+        int count = truth_kind_parameters(self->wish.kind[i], &self->truth, parameters);
+        fprintf(file,
+                "%s\n    {\"id\": \"%s\", \"catalogued\": %s, \"amount\": %.6g, \"expected_evidence_nats\": %.4g, ",
+                i ? "," : "", truth_kind_name(self->wish.kind[i]),
+                truth_kind_is_catalogued(self->wish.kind[i]) ? "true" : "false", self->hidden[i].amount,
+                self->evidence_nats[i]);
+        fprintf(file, "\"share_of_torque\": %.4g, \"parameters\": {", self->share[i]);
+        for (int k = 0; k < count; k++) {
+            fprintf(file, "%s\"%s\": %.12g", k ? ", " : "", parameters[k].name, parameters[k].value);
+        }
+        fprintf(file, "}}");
+    }
+    fprintf(file, "],\n");
+}
+
 static void write_answer(const struct truth_case *self, FILE *file)
 {
-    const struct truth_plant_spec *truth = &self->truth;
-    fprintf(file, "{\n  \"effect\": \"%s\",\n  \"catalogued\": %s,\n  \"seed\": %llu,\n  \"size\": %.12g,\n",
-            truth_kind_name(self->kind), truth_kind_is_catalogued(self->kind) ? "true" : "false",
-            (unsigned long long)self->seed, self->size);
-    fprintf(file, "  \"protocol\": \"%s\",\n  \"expected_evidence_nats\": %.4g,\n  \"parameters\": {",
-            self->protocol == truth_protocol_stroke ? "stroke" : "multisine", self->expected_evidence_nats);
-    for (int i = 0; i < self->parameters; i++) {
-        fprintf(file, "%s\"%s\": %.12g", i ? ", " : "", self->parameter[i].name, self->parameter[i].value);
-    }
-    fprintf(file, "},\n  \"drive\": {\"structure\": \"%s\", \"motor_inertia_kgm2\": %.12g, ",
+    const struct truth_plant_spec *truth = &self->truth.plant;
+    const struct truth_sensors *sensors = &self->truth.sensors;
+    fprintf(file, "{\n  \"seed\": %llu,\n  \"size\": \"%s\",\n  \"size_reached\": %s,\n",
+            (unsigned long long)self->wish.seed, truth_size_name(self->wish.size), self->reached ? "true" : "false");
+    write_causes(self, file);
+    fprintf(file, "  \"protocol\": \"%s\",\n", self->protocol == truth_protocol_stroke ? "stroke" : "multisine");
+    fprintf(file, "  \"drive\": {\"structure\": \"%s\", \"motor_inertia_kgm2\": %.12g, ",
             truth->two_mass ? "two_mass" : "rigid", truth->motor_inertia_kgm2);
     fprintf(file, "\"load_inertia_kgm2\": %.12g, \"belt_stiffness_Nm_per_rad\": %.12g,\n", truth->load_inertia_kgm2,
             truth->belt_stiffness_Nm_per_rad);
@@ -43,11 +60,11 @@ static void write_answer(const struct truth_case *self, FILE *file)
             truth->belt_damping_Nms_per_rad, truth->viscous_friction_Nms_per_rad);
     fprintf(file, "    \"coulomb_friction_Nm\": %.12g, \"torque_lag_s\": %.12g, \"dead_time_s\": %.12g,\n",
             truth->coulomb_friction_Nm, truth->torque_lag_s, truth->dead_time_s);
-    fprintf(file, "    \"cogging_phase_rad\": %.12g, \"process_noise_Nm\": %.12g},\n", truth->cogging_phase_rad,
-            truth->process_noise_Nm);
+    fprintf(file, "    \"bristle\": %d, \"speed_from_encoder\": %d, \"process_noise_Nm\": %.12g},\n",
+            (int)truth->bristle, sensors->speed_from_encoder, truth->process_noise_Nm);
     fprintf(file, "  \"noise\": {\"position_rad\": %.4g, \"velocity_rad_per_s\": %.4g, \"torque_Nm\": %.4g, ",
-            self->sensors.position_rad, self->sensors.velocity_rad_per_s, self->sensors.torque_Nm);
-    fprintf(file, "\"counts_per_rev\": %.0f},\n", self->sensors.counts_per_rev);
+            sensors->position_rad, sensors->velocity_rad_per_s, sensors->torque_Nm);
+    fprintf(file, "\"counts_per_rev\": %.0f},\n", sensors->counts_per_rev);
     fprintf(file, "  \"controller\": {\"position_gain_per_s\": %.6g, \"velocity_gain_Nms_per_rad\": %.6g, ",
             self->controller.position_gain_per_s, self->controller.velocity_gain_Nms_per_rad);
     fprintf(file, "\"integral_rate_per_s\": %.6g, \"late_samples\": %d}\n}\n", self->controller.integral_rate_per_s,
@@ -103,11 +120,10 @@ static int write_run(const struct truth_case *self, const char *directory, const
                      const struct truth_excitation *excitation, uint64_t noise_seed)
 {
     struct truth_run run;
-    int status =
-        truth_run_make(&run, &self->truth, &self->controller, &self->sensors, excitation, self->periods, noise_seed);
+    int status = truth_run_make(&run, &self->truth.plant, &self->controller, &self->truth.sensors, excitation,
+                                self->periods, noise_seed);
     if (status) {
-        fprintf(stderr, "%s seed %llu: the loop left its reference\n", truth_kind_name(self->kind),
-                (unsigned long long)self->seed);
+        fprintf(stderr, "%s: seed %llu: the loop left its reference\n", directory, (unsigned long long)self->wish.seed);
     } else {
         FILE *file = open_in(directory, name);
         status = file ? truth_run_write(&run, file) : -1;
@@ -122,9 +138,9 @@ int truth_case_write(const struct truth_case *self, const char *directory)
     if (make_directories(directory)) {
         return -1;
     }
-    uint64_t noise_seed = self->seed * 64u + (uint64_t)self->kind;
-    if (write_run(self, directory, "run1.csv", &self->fit, 2u * noise_seed) ||
-        write_run(self, directory, "run2.csv", &self->validation, 2u * noise_seed + 1u)) {
+    uint64_t noise_seed = truth_case_noise_seed(self);
+    if (write_run(self, directory, "run1.csv", &self->fit, noise_seed) ||
+        write_run(self, directory, "run2.csv", &self->validation, noise_seed + 1u)) {
         return -1;
     }
     FILE *model = open_in(directory, "nominal.json");

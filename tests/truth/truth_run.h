@@ -14,17 +14,23 @@ struct truth_controller {
     int late_samples; ///< 0: the torque computed from sample n is held from n; 1: from n + 1
 };
 
-/// Standard deviations of white noise; the encoder rounds to whole counts after its noise.
+/// What stands between the drive and the file. Standard deviations are of white noise; the encoder rounds to whole
+/// counts after its noise, and not at all with 0 counts.
 struct truth_sensors {
     double position_rad, velocity_rad_per_s, torque_Nm;
     double counts_per_rev;
+    double eccentricity_rad, eccentricity_phase_rad; ///< the angle shows th + a cos(th + phase)
+    int speed_from_encoder;                          ///< and the speed its derivative, v (1 - a sin(th + phase))
+    double filter_s;                                 ///< first-order lag of angle and speed alike
+    double lost_share;                               ///< of rows that repeat the one before; the controller sees all
 };
 
 /// Measured columns of a run, and what really moved. Owned by whoever makes it; free with truth_run_free.
 struct truth_run {
     int samples, periods; ///< periods: all of them, the transient one included
     double *torque_ref_Nm, *torque_Nm, *position_rad, *velocity_rad_per_s;
-    double *true_position_rad, *true_velocity_rad_per_s;
+    double *true_position_rad, *true_velocity_rad_per_s, *true_torque_Nm;
+    int lost; ///< rows that repeat the one before
 };
 
 /// Choose gains as high as keeps max |1/(1+L)| of the linear loop (all delays included) below 1.9, at most those asked

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "tests/truth/truth_case.h"
+#include "tests/truth/truth_plant.h"
 #include "unity.h"
 
 static const double pi = 3.14159265358979323846;
@@ -322,132 +322,314 @@ static void test_truth_plant_process_noise_has_the_stated_size(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.02 * 0.01, 0.01, sqrt(square / SAMPLES));
 }
 
-static double line_size(const double *samples, int k)
+// ---- Terms of single causes, each against its closed form
+
+static void test_truth_plant_output_is_clipped_behind_the_lag(void)
 {
-    double re = 0.0, im = 0.0;
-    for (int n = 0; n < TRUTH_PERIOD_SAMPLES; n++) {
-        double angle = 2.0 * pi * (double)((k * n) % TRUTH_PERIOD_SAMPLES) / TRUTH_PERIOD_SAMPLES;
-        re += samples[n] * cos(angle);
-        im += samples[n] * sin(angle);
-    }
-    return 2.0 * hypot(re, im) / TRUTH_PERIOD_SAMPLES;
+    struct truth_plant_spec spec = body();
+    spec.torque_lag_s = 1e-3;
+    spec.torque_limit_Nm = 0.1;
+    start(&spec);
+    play(0.3, 20);
+    // The lag passes 0.1 of 0.3 at T ln 1.5 and goes on behind the clip.
+    double T = 1e-3, reached = T * log(1.5), before = 0.3 * (reached - T * (1.0 - exp(-reached / T)));
+    TEST_ASSERT_DOUBLE_WITHIN(rounding, 0.1, truth_plant_output_Nm(&drive));
+    TEST_ASSERT_TRUE(drive.torque_Nm > 0.29);
+    // One step of 40 us holds the kink: (40e-6)^2 / 8 of a torque's slope of 0.2 / T.
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, (before + 0.1 * (20e-3 - reached)) / 0.005, drive.velocity_rad_per_s);
 }
 
-static void test_truth_excitation_has_its_lines_and_no_others(void)
+static void test_truth_plant_command_is_clipped_before_the_lag(void)
 {
-    static struct truth_excitation excitation;
-    struct truth_excitation_wish wish = {.inertia_kgm2 = 0.005,
-                                         .torque_rms_Nm = 0.5,
-                                         .speed_max_rad_per_s = 2.0,
-                                         .corner_hz = 5.0,
-                                         .stroke_rad = 2.0,
-                                         .centre_rad = 0.3};
-    struct truth_random random;
-    truth_random_init(&random, 9u, 1u);
-    truth_excitation_make(&excitation, &wish, &random);
-    for (int k = 1; k < TRUTH_PERIOD_SAMPLES / 2; k += 3) {
-        double v = line_size(excitation.velocity_rad_per_s, k), w = pi * k;
-        if (k > TRUTH_LINES) {
-            TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, v);
-        } else {
-            TEST_ASSERT_TRUE(v > 1e-3);
-        }
-        TEST_ASSERT_DOUBLE_WITHIN(1e-9, v / w, line_size(excitation.position_rad, k));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-6, v * w, line_size(excitation.acceleration_rad_per_s2, k));
-    }
-    TEST_ASSERT_TRUE(truth_excitation_range_rad(&excitation) > 3.5);
-    TEST_ASSERT_TRUE(fabs(excitation.velocity_rad_per_s[0]) < 0.3);
+    struct truth_plant_spec spec = body();
+    spec.torque_lag_s = 1e-3;
+    spec.command_limit_Nm = 0.1;
+    start(&spec);
+    play(-0.3, 2);
+    TEST_ASSERT_DOUBLE_WITHIN(rounding, -0.1 * (1.0 - exp(-2.0)), truth_plant_output_Nm(&drive));
 }
 
-static int same_run(const struct truth_case *made, uint64_t first, uint64_t second)
+static void test_truth_plant_torque_rate_limits_each_sample(void)
 {
-    struct truth_run a, b;
-    int failed = truth_run_make(&a, &made->truth, &made->controller, &made->sensors, &made->fit, 2, first);
-    failed |= truth_run_make(&b, &made->truth, &made->controller, &made->sensors, &made->fit, 2, second);
-    TEST_ASSERT_EQUAL_INT(0, failed);
-    size_t bytes = (size_t)a.samples * sizeof(double);
-    int same = memcmp(a.torque_ref_Nm, b.torque_ref_Nm, bytes) == 0 && memcmp(a.torque_Nm, b.torque_Nm, bytes) == 0 &&
-               memcmp(a.position_rad, b.position_rad, bytes) == 0 &&
-               memcmp(a.velocity_rad_per_s, b.velocity_rad_per_s, bytes) == 0;
-    truth_run_free(&a);
-    truth_run_free(&b);
-    return same;
-}
-
-static void test_truth_case_is_the_same_for_the_same_seed(void)
-{
-    static struct truth_case a, b, other;
-    truth_case_make(&a, 5u, truth_kind_cogging, 1.0, truth_protocol_any);
-    truth_case_make(&b, 5u, truth_kind_cogging, 1.0, truth_protocol_any);
-    truth_case_make(&other, 6u, truth_kind_cogging, 1.0, truth_protocol_any);
-    TEST_ASSERT_EQUAL_MEMORY(&a.fit, &b.fit, sizeof a.fit);
-    TEST_ASSERT_EQUAL_MEMORY(&a.truth, &b.truth, sizeof a.truth);
-    TEST_ASSERT_TRUE(memcmp(&a.truth, &other.truth, sizeof a.truth) != 0);
-    TEST_ASSERT_TRUE(same_run(&a, 3u, 3u));
-    TEST_ASSERT_FALSE(same_run(&a, 3u, 4u));
-}
-
-// Largest relative difference of the nominal model from the drive without the effect.
-static double nominal_error(const struct truth_case *made)
-{
-    const struct truth_plant_spec *a = &made->nominal, *b = &made->without;
-    double error = fabs(a->motor_inertia_kgm2 / b->motor_inertia_kgm2 - 1.0);
-    error = fmax(error, fabs(a->load_inertia_kgm2 / b->load_inertia_kgm2 - 1.0));
-    error = fmax(error, fabs(a->torque_lag_s / b->torque_lag_s - 1.0));
-    error = fmax(error, fabs(a->dead_time_s - b->dead_time_s) / 1e-3);
-    error = fmax(error, fabs(a->coulomb_friction_Nm - b->coulomb_friction_Nm) / 0.12);
-    return error;
-}
-
-static void test_truth_case_hides_one_visible_effect_of_each_kind(void)
-{
-    static struct truth_case made;
-    for (int kind = 0; kind < truth_kind_count; kind++) {
-        for (uint64_t seed = 100; seed < 104; seed++) {
-            truth_case_make(&made, seed, (enum truth_kind)kind, 1.0, truth_protocol_any);
-            TEST_ASSERT_TRUE_MESSAGE(nominal_error(&made) <= 0.03, truth_kind_name((enum truth_kind)kind));
-            int differs = memcmp(&made.truth, &made.without, sizeof made.truth) != 0;
-            TEST_ASSERT_EQUAL_INT_MESSAGE(kind != truth_kind_clean, differs, truth_kind_name((enum truth_kind)kind));
-            int shown = kind == truth_kind_clean || made.expected_evidence_nats >= 1000.0;
-            TEST_ASSERT_TRUE_MESSAGE(shown, truth_kind_name((enum truth_kind)kind));
-            TEST_ASSERT_TRUE(kind == truth_kind_clean || made.parameters > 0);
-        }
+    struct truth_plant_spec spec = body();
+    spec.torque_rate_Nm_per_s = 20.0;
+    start(&spec);
+    for (int n = 1; n <= 5; n++) {
+        play(0.07, 1);
+        TEST_ASSERT_DOUBLE_WITHIN(rounding, fmin(0.07, 0.02 * n), truth_plant_output_Nm(&drive));
     }
 }
 
-static void test_truth_case_cogging_has_two_periods_under_the_motion(void)
+static void test_truth_plant_dead_band_takes_its_torque_away(void)
 {
-    static struct truth_case made;
-    for (uint64_t seed = 1; seed <= 10; seed++) {
-        truth_case_make(&made, seed, truth_kind_cogging, 1.0, truth_protocol_any);
-        double n = made.truth.cogging_periods_per_rev;
-        TEST_ASSERT_TRUE(n >= 6.0 && n <= 60.0 && n == floor(n));
-        TEST_ASSERT_TRUE(n * truth_excitation_range_rad(&made.validation) / (2.0 * pi) >= 2.0);
+    struct truth_plant_spec spec = body();
+    spec.torque_dead_band_Nm = 0.02;
+    start(&spec);
+    play(0.019, 10);
+    TEST_ASSERT_TRUE(drive.velocity_rad_per_s == 0.0);
+    play(-0.05, 10);
+    TEST_ASSERT_DOUBLE_WITHIN(rounding, -0.03, truth_plant_output_Nm(&drive));
+    TEST_ASSERT_DOUBLE_WITHIN(rounding, -0.03 / 0.005 * 10e-3, drive.velocity_rad_per_s);
+}
+
+static void test_truth_plant_periodic_disturbance_swings_the_body(void)
+{
+    struct truth_plant_spec spec = body();
+    spec.disturbance_amplitude_Nm = 0.02;
+    spec.disturbance_hz = 17.3;
+    spec.disturbance_phase_rad = 0.6;
+    start(&spec);
+    play(0.0, 300);
+    double w = 2.0 * pi * 17.3, right = 0.02 / (0.005 * w) * (cos(0.6) - cos(w * 0.3 + 0.6));
+    TEST_ASSERT_DOUBLE_WITHIN(integration, right, drive.velocity_rad_per_s);
+}
+
+static void test_truth_plant_friction_drifts_with_time(void)
+{
+    struct truth_plant_spec spec = body();
+    spec.coulomb_friction_Nm = 0.05;
+    spec.friction_drift_ratio = -0.4;
+    spec.friction_drift_s = 0.7;
+    start(&spec);
+    truth_plant_launch(&drive, 8.0);
+    play(0.0, 600);
+    double t = 0.6, T = 0.7, impulse = 0.05 * (t - 0.4 * (t - T * (1.0 - exp(-t / T))));
+    TEST_ASSERT_DOUBLE_WITHIN(integration, 8.0 - impulse / 0.005, drive.velocity_rad_per_s);
+}
+
+static void test_truth_plant_torque_constant_drifts_with_time(void)
+{
+    struct truth_plant_spec spec = body();
+    spec.torque_drift_ratio = -0.2;
+    spec.torque_drift_s = 0.5;
+    start(&spec);
+    play(0.1, 600);
+    double t = 0.6, T = 0.5, impulse = 0.1 * (t - 0.2 * (t - T * (1.0 - exp(-t / T))));
+    TEST_ASSERT_DOUBLE_WITHIN(integration, impulse / 0.005, drive.velocity_rad_per_s);
+    TEST_ASSERT_TRUE(truth_plant_output_Nm(&drive) == 0.1);
+}
+
+static void test_truth_plant_bias_step_pushes_from_its_time_on(void)
+{
+    struct truth_plant_spec spec = body();
+    spec.step_bias_Nm = 0.03;
+    spec.step_bias_s = 0.25;
+    start(&spec);
+    play(0.0, 250);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.0, drive.velocity_rad_per_s); // the step may fall into the last integration step
+    play(0.0, 200);
+    TEST_ASSERT_DOUBLE_WITHIN(3e-4, 0.03 / 0.005 * 0.2, drive.velocity_rad_per_s);
+}
+
+static void test_truth_plant_burst_lasts_as_long_as_stated(void)
+{
+    struct truth_plant_spec spec = body();
+    spec.burst_amplitude_Nm = 0.1;
+    spec.burst_hz = 20.0;
+    spec.burst_length_s = 0.15;
+    spec.burst_every_s = 1.0;
+    start(&spec);
+    int moving = 0;
+    double before = 0.0, most = 0.0;
+    for (int n = 0; n < 4000; n++) {
+        play(0.0, 1);
+        double change = fabs(drive.velocity_rad_per_s - before) / sample_s * 0.005;
+        moving += change > 1e-9;
+        most = fmax(most, change);
+        before = drive.velocity_rad_per_s;
+    }
+    TEST_ASSERT_INT_WITHIN(8, 4 * 150, moving); // each burst's two ends fall inside a sample
+    TEST_ASSERT_TRUE(most > 0.08 && most <= 0.1);
+}
+
+static void test_truth_plant_friction_grows_with_torque(void)
+{
+    struct truth_plant_spec spec = body();
+    spec.friction_per_torque = 0.1;
+    start(&spec);
+    play(-0.2, 100);
+    TEST_ASSERT_DOUBLE_WITHIN(rounding, -0.2 * 0.9 / 0.005 * 0.1, drive.velocity_rad_per_s);
+}
+
+static void test_truth_plant_ground_spring_swings_at_its_frequency(void)
+{
+    struct truth_plant_spec spec = body();
+    spec.ground_stiffness_Nm_per_rad = 0.5;
+    spec.coulomb_origin_rad = 0.3;
+    start(&spec); // at rest 0.3 rad from the spring's middle
+    play(0.0, 777);
+    double w = sqrt(0.5 / 0.005), right = 0.3 - 0.3 * cos(w * 0.777);
+    TEST_ASSERT_DOUBLE_WITHIN(integration, right, drive.position_rad);
+}
+
+static double bristle_energy(double x, double distance)
+{
+    return 0.05 * (x - distance * (1.0 - exp(-x / distance)));
+}
+
+static void test_truth_plant_dahl_friction_takes_its_energy_over_the_distance(void)
+{
+    struct truth_plant_spec spec = body();
+    spec.coulomb_friction_Nm = 0.05;
+    spec.presliding_distance_rad = 0.02;
+    start(&spec);
+    truth_plant_launch(&drive, 1.5);
+    for (int n = 0; n < 60; n++) {
+        play(0.0, 1);
+        double x = drive.position_rad, left = 0.5 * 0.005 * (2.25 - pow(drive.velocity_rad_per_s, 2.0));
+        TEST_ASSERT_TRUE(drive.velocity_rad_per_s > 0.0);
+        TEST_ASSERT_DOUBLE_WITHIN(integration, bristle_energy(x, 0.02), left);
+        TEST_ASSERT_DOUBLE_WITHIN(integration, 1.0 - exp(-x / 0.02), drive.bristle);
     }
 }
 
-static void test_truth_run_stays_near_its_reference_in_the_closed_loop(void)
+static void test_truth_plant_lugre_damping_adds_the_deflections_rate(void)
 {
-    static struct truth_case made;
-    for (int kind = 0; kind < truth_kind_count; kind++) {
-        truth_case_make(&made, 7u, (enum truth_kind)kind, 1.0, truth_protocol_any);
-        struct truth_run run;
-        TEST_ASSERT_EQUAL_INT(0, truth_run_make(&run, &made.truth, &made.controller, &made.sensors, &made.fit, 2, 1u));
-        double error = 0.0, travel = 0.0, torque = 0.0, peak = 0.0;
-        for (int n = 0; n < TRUTH_PERIOD_SAMPLES; n++) {
-            int late = TRUTH_PERIOD_SAMPLES + n;
-            error += pow(run.true_position_rad[late] - made.fit.position_rad[n], 2.0);
-            travel += pow(made.fit.position_rad[n] - made.truth.coulomb_origin_rad, 2.0);
-            torque += pow(run.torque_ref_Nm[late], 2.0);
-            peak = fmax(peak, fabs(run.torque_ref_Nm[late]));
-        }
-        truth_run_free(&run);
-        // A two-mass drive fed forward as one body swings on its own mode, up to a fifth of a small travel.
-        TEST_ASSERT_TRUE_MESSAGE(error < 0.09 * travel, truth_kind_name((enum truth_kind)kind));
-        // A multisine's crest is 3 to 4; a loop on the edge of stability adds a limit cycle to it.
-        TEST_ASSERT_TRUE_MESSAGE(peak * peak < 25.0 * torque / TRUTH_PERIOD_SAMPLES,
-                                 truth_kind_name((enum truth_kind)kind));
+    struct truth_plant_spec spec = body();
+    spec.coulomb_friction_Nm = 0.05;
+    spec.presliding_distance_rad = 0.02;
+    spec.bristle = truth_bristle_lugre;
+    spec.bristle_damping_s = 0.8e-3;
+    start(&spec);
+    truth_plant_launch(&drive, 1.5);
+    double dz = 1.5 / 0.02, right = 0.05 * 0.8e-3 * dz;
+    TEST_ASSERT_DOUBLE_WITHIN(rounding, right, truth_plant_resistance_Nm(&spec, 0.0, 1.5, 1));
+    play(0.0, 40);
+    // z follows the way alone whatever the force; dv/dx = -Fc (z + Tb v (1 - z) / x0) / (J v), by fine Euler steps.
+    double v = 1.5, h = drive.position_rad / 400000.0;
+    for (int i = 0; i < 400000; i++) {
+        double z = 1.0 - exp(-(i + 0.5) * h / 0.02);
+        v -= h * 0.05 * (z + 0.8e-3 * v * (1.0 - z) / 0.02) / (0.005 * v);
     }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, v, drive.velocity_rad_per_s);
+}
+
+static void test_truth_plant_elastoplastic_friction_springs_back_while_it_is_small(void)
+{
+    struct truth_plant_spec spec = body();
+    spec.coulomb_friction_Nm = 0.05;
+    spec.presliding_distance_rad = 0.02;
+    spec.bristle = truth_bristle_elastoplastic;
+    spec.bristle_elastic_share = 0.5;
+    start(&spec);
+    double w = sqrt(0.05 / 0.02 / 0.005), v = 0.4 * 0.02 * w; // to 0.4 of the distance
+    truth_plant_launch(&drive, v);
+    play(0.0, 1234);
+    TEST_ASSERT_DOUBLE_WITHIN(integration, v / w * sin(w * 1.234), drive.position_rad);
+    play(0.2, 100);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 1.0, drive.bristle);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3 * 0.05, 0.05, truth_plant_resistance_Nm(&spec, 0.0, 0.0, 1) + 0.05);
+}
+
+// Motor stuck, load given a speed by hand: what the belt alone does.
+static void swing_load(const struct truth_plant_spec *spec, double position, double speed)
+{
+    truth_plant_init(&drive, spec, position, 1u);
+    drive.spec.coulomb_friction_Nm = 1000.0;
+    drive.load_velocity_rad_per_s = speed;
+}
+
+static void test_truth_plant_stiffness_changes_along_the_travel(void)
+{
+    struct truth_plant_spec spec = two_bodies();
+    spec.stiffness_slope_per_rad = 0.08;
+    swing_load(&spec, 2.5, 1.0);
+    TEST_ASSERT_DOUBLE_WITHIN(crossing * 45.0, 40.0 * sqrt(1.2), twist_frequency_hz(2000));
+}
+
+static void test_truth_plant_hardening_belt_turns_where_its_energy_is(void)
+{
+    struct truth_plant_spec spec = two_bodies();
+    double k = spec.belt_stiffness_Nm_per_rad, c = 2000.0, speed = 8.0, most = 0.0;
+    spec.stiffness_cubic_per_rad2 = c;
+    swing_load(&spec, 0.0, speed);
+    for (int n = 0; n < 1000; n++) {
+        play(0.0, 1);
+        double e = twist(), potential = 0.5 * k * e * e + 0.25 * k * c * pow(e, 4.0);
+        double kinetic = 0.5 * 0.003 * pow(drive.load_velocity_rad_per_s, 2.0);
+        TEST_ASSERT_DOUBLE_WITHIN(10.0 * integration, 0.5 * 0.003 * speed * speed, potential + kinetic);
+        most = fmax(most, fabs(e));
+    }
+    // k e^2 / 2 (1 + c e^2 / 2) = J v^2 / 2; samples miss the turning point by up to half of one.
+    double square = (sqrt(1.0 + 2.0 * c * 0.003 * speed * speed / k) - 1.0) / c;
+    TEST_ASSERT_DOUBLE_WITHIN(0.01 * sqrt(square), sqrt(square), most);
+}
+
+static void test_truth_plant_backlash_lets_the_load_fly_through_the_gap(void)
+{
+    struct truth_plant_spec spec = two_bodies();
+    spec.gap_rad = 0.02;
+    spec.belt_damping_Nms_per_rad = 0.1;
+    spec.step_s = 10e-6;
+    swing_load(&spec, 0.0, 1.0);
+    play(0.0, 9);
+    TEST_ASSERT_DOUBLE_WITHIN(rounding, 0.009, drive.load_position_rad);
+    TEST_ASSERT_DOUBLE_WITHIN(rounding, 1.0, drive.load_velocity_rad_per_s);
+    drive.spec.belt_damping_Nms_per_rad = 0.0;
+    double k = spec.belt_stiffness_Nm_per_rad;
+    for (int n = 0; n < 500; n++) {
+        play(0.0, 1);
+        double beyond = fmax(0.0, fabs(twist()) - 0.01);
+        double all = 0.5 * k * beyond * beyond + 0.5 * 0.003 * pow(drive.load_velocity_rad_per_s, 2.0);
+        // Each contact begins inside a step of 10 us: (10e-6 w)^2 of the energy, some 50 times.
+        TEST_ASSERT_DOUBLE_WITHIN(2e-3 * 0.0015, 0.0015, all);
+    }
+}
+
+static void test_truth_plant_third_mass_swings_on_its_own_spring(void)
+{
+    struct truth_plant_spec spec = two_bodies();
+    spec.third_inertia_kgm2 = 0.0005;
+    spec.third_stiffness_Nm_per_rad = 0.0005 * pow(2.0 * pi * 55.0, 2.0);
+    truth_plant_init(&drive, &spec, 0.0, 1u);
+    drive.spec.coulomb_friction_Nm = 1000.0;
+    drive.spec.load_inertia_kgm2 = 1e9;
+    drive.third_velocity_rad_per_s = 1.0;
+    play(0.0, 1234);
+    double w = 2.0 * pi * 55.0;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, sin(w * 1.234) / w, drive.third_position_rad);
+    drive.spec.third_damping_Nms_per_rad = 2.0 * 0.05 * 0.0005 * w;
+    play(0.0, 2000);
+    TEST_ASSERT_TRUE(fabs(drive.third_position_rad) < 1e-9);
+}
+
+static void test_truth_plant_third_mass_keeps_the_momentum(void)
+{
+    struct truth_plant_spec spec = two_bodies();
+    spec.third_inertia_kgm2 = 0.0005;
+    spec.third_stiffness_Nm_per_rad = 30.0;
+    spec.third_damping_Nms_per_rad = 0.01;
+    start(&spec);
+    play(0.5, 3);
+    play(0.0, 500);
+    double momentum = 0.002 * drive.velocity_rad_per_s + 0.003 * drive.load_velocity_rad_per_s +
+                      0.0005 * drive.third_velocity_rad_per_s;
+    TEST_ASSERT_DOUBLE_WITHIN(rounding, 0.5 * 3e-3, momentum);
+}
+
+static void test_truth_plant_load_friction_slows_the_load(void)
+{
+    struct truth_plant_spec spec = two_bodies();
+    spec.load_coulomb_Nm = 0.05;
+    spec.step_s = 10e-6;
+    start(&spec);
+    truth_plant_launch(&drive, 5.0);
+    play(0.0, 100);
+    // The bristle is stretched within 1e-3 rad; the energy it misses there is 0.05 1e-4.
+    double motion = 0.002 * drive.velocity_rad_per_s + 0.003 * drive.load_velocity_rad_per_s;
+    TEST_ASSERT_DOUBLE_WITHIN(0.05 * 1e-4, 0.005 * 5.0 - 0.05 * 0.1, motion);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, drive.load_bristle);
+}
+
+static void test_truth_plant_placed_motor_leaves_the_load_alone(void)
+{
+    struct truth_plant_spec spec = two_bodies();
+    start(&spec);
+    play(0.5, 3);
+    double load = drive.load_position_rad, speed = drive.load_velocity_rad_per_s;
+    truth_plant_place(&drive, 0.4, -1.0);
+    TEST_ASSERT_TRUE(drive.position_rad == 0.4 && drive.velocity_rad_per_s == -1.0);
+    TEST_ASSERT_TRUE(drive.load_position_rad == load && drive.load_velocity_rad_per_s == speed);
 }
 
 int main(void)
@@ -471,10 +653,26 @@ int main(void)
     RUN_TEST(test_truth_plant_torque_lags_exponentially);
     RUN_TEST(test_truth_plant_cogging_and_bias_push_the_motor_forward);
     RUN_TEST(test_truth_plant_process_noise_has_the_stated_size);
-    RUN_TEST(test_truth_excitation_has_its_lines_and_no_others);
-    RUN_TEST(test_truth_case_is_the_same_for_the_same_seed);
-    RUN_TEST(test_truth_case_hides_one_visible_effect_of_each_kind);
-    RUN_TEST(test_truth_case_cogging_has_two_periods_under_the_motion);
-    RUN_TEST(test_truth_run_stays_near_its_reference_in_the_closed_loop);
+    RUN_TEST(test_truth_plant_output_is_clipped_behind_the_lag);
+    RUN_TEST(test_truth_plant_command_is_clipped_before_the_lag);
+    RUN_TEST(test_truth_plant_torque_rate_limits_each_sample);
+    RUN_TEST(test_truth_plant_dead_band_takes_its_torque_away);
+    RUN_TEST(test_truth_plant_periodic_disturbance_swings_the_body);
+    RUN_TEST(test_truth_plant_friction_drifts_with_time);
+    RUN_TEST(test_truth_plant_torque_constant_drifts_with_time);
+    RUN_TEST(test_truth_plant_bias_step_pushes_from_its_time_on);
+    RUN_TEST(test_truth_plant_burst_lasts_as_long_as_stated);
+    RUN_TEST(test_truth_plant_friction_grows_with_torque);
+    RUN_TEST(test_truth_plant_ground_spring_swings_at_its_frequency);
+    RUN_TEST(test_truth_plant_dahl_friction_takes_its_energy_over_the_distance);
+    RUN_TEST(test_truth_plant_lugre_damping_adds_the_deflections_rate);
+    RUN_TEST(test_truth_plant_elastoplastic_friction_springs_back_while_it_is_small);
+    RUN_TEST(test_truth_plant_stiffness_changes_along_the_travel);
+    RUN_TEST(test_truth_plant_hardening_belt_turns_where_its_energy_is);
+    RUN_TEST(test_truth_plant_backlash_lets_the_load_fly_through_the_gap);
+    RUN_TEST(test_truth_plant_third_mass_swings_on_its_own_spring);
+    RUN_TEST(test_truth_plant_third_mass_keeps_the_momentum);
+    RUN_TEST(test_truth_plant_load_friction_slows_the_load);
+    RUN_TEST(test_truth_plant_placed_motor_leaves_the_load_alone);
     return UNITY_END();
 }
