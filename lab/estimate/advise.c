@@ -4,6 +4,7 @@
 #include "lab/estimate/columns.h"
 #include "lab/estimate/stretch.h"
 
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -11,6 +12,9 @@
 /// Fewer periods than this scatter too much for a variance; a transient that costs more than one in eight is worth a
 /// method of its own, whose noise is a little higher.
 enum { few_periods = 5, dear_share = 8 };
+
+/// Periods that differ from each other by more of the output than this hide a transient.
+static const double restless = 0.2;
 
 #if defined(__GNUC__)
 __attribute__((format(printf, 2, 3)))
@@ -37,6 +41,16 @@ static bool is_unsettled(const struct periodic *recording)
            (!recording->transient.settled || recording->transient.periods > given_up(recording));
 }
 
+/// RMS distance of the later half's periods from their mean, over the output's size.
+static double restless_level(const struct periodic *recording)
+{
+    double sum = 0.0;
+    for (size_t p = recording->total / 2; p < recording->total; p++) {
+        sum += recording->output_level[p] * recording->output_level[p];
+    }
+    return sqrt(sum / (double)(recording->total - recording->total / 2));
+}
+
 static void add_settling(const struct periodic *recording, struct estimate_advice *io_advice)
 {
     if (recording->total < 4) {
@@ -47,6 +61,11 @@ static void add_settling(const struct periodic *recording, struct estimate_advic
     } else if (is_unsettled(recording)) {
         add(io_advice, "a transient (%.2g of the output in the first period) takes %zu of %zu periods to settle",
             recording->output_level[0], recording->transient.periods, recording->total);
+    } else if (restless_level(recording) > restless) {
+        add(io_advice,
+            "no transient stands out of what differs from period to period anyway (%.2g of the output): whether it has "
+            "settled cannot be seen",
+            restless_level(recording));
     } else if (given_up(recording) > 0) {
         add(io_advice, "it is settled after the %zu of %zu periods that its settle_periods gives up",
             given_up(recording), recording->total);
@@ -65,8 +84,8 @@ void estimate_advise(const struct periodic *recording, struct estimate_advice *o
         unsettled && (!recording->transient.settled || recording->transient.periods * dear_share > recording->total);
     bool local = (dear || few) && in_a_row >= 2;
     *out_advice = (struct estimate_advice){.method = local ? "lpm" : "mean"};
-    add(out_advice, "method %s suits this recording: it repeats every %zu samples, ", out_advice->method,
-        recording->period_samples);
+    add(out_advice, "method %s suits this recording: it repeats every %.9g samples, ", out_advice->method,
+        recording->true_period_samples > 0.0 ? recording->true_period_samples : (double)recording->period_samples);
     add_settling(recording, out_advice);
     if (unsettled && !local) {
         add(out_advice, ", which --settle auto leaves out");
@@ -93,8 +112,10 @@ void estimate_advise_arbitrary(const struct arbitrary *recording, struct estimat
     *out_advice = (struct estimate_advice){.method = closed ? "indirect" : "lpm"};
     add(out_advice, "method %s suits this recording: it has no period, ", out_advice->method);
     if (closed) {
-        add(out_advice, "and %s shows that a loop is closed, so that %s holds noise of the output: h1 would be biased",
-            recording->reference, recording->input);
+        add(out_advice,
+            "and %s shows that a loop is closed, so that %s holds noise of the output: h1 would be biased; lpm, which "
+            "goes through %s too, resolves narrow resonances better, with more noise",
+            recording->reference, recording->input, recording->reference);
     } else {
         add(out_advice,
             "and no set-point shows a closed loop: lpm takes out what h1 loses at the ends of its segments");

@@ -3,6 +3,11 @@
 
 #include "lab/estimate/columns.h"
 
+#include <math.h>
+
+/// What the numbers of a ramp may have been rounded to.
+static const double rounding_of_ramp = 1e-6;
+
 static void find_longest_stretch(size_t first_row, struct arbitrary *io_self)
 {
     const struct run *run = io_self->run;
@@ -22,6 +27,38 @@ static void find_longest_stretch(size_t first_row, struct arbitrary *io_self)
             start = row + 1;
         }
     }
+}
+
+/// A constant and a ramp excite nothing, and what a window leaves of them would pass for power on every line.
+static int check_excites(const struct arbitrary *self, const char *column, struct error *out_error)
+{
+    const double *x = run_column(self->run, column) + self->first;
+    const double middle = 0.5 * (double)(self->rows - 1);
+    double mean = 0.0;
+    double product = 0.0;
+    double square = 0.0;
+    double rest = 0.0;
+    for (size_t n = 0; n < self->rows; n++) {
+        mean += x[n] / (double)self->rows;
+    }
+    for (size_t n = 0; n < self->rows; n++) {
+        const double distance = (double)n - middle;
+        product += distance * (x[n] - mean);
+        square += distance * distance;
+    }
+    const double slope = product / square;
+    for (size_t n = 0; n < self->rows; n++) {
+        const double left = x[n] - mean - slope * ((double)n - middle);
+        rest += left * left / (double)self->rows;
+    }
+    const double height = fmax(fabs(slope) * (double)self->rows, rounding_of_ramp * fabs(mean));
+    if (sqrt(rest) > rounding_of_ramp * height) {
+        return 0;
+    }
+    return error_set(out_error, error_refused,
+                     "%s: %s is a straight line from %.6g to %.6g, and what else is in it, %.2g RMS, is rounding: "
+                     "expected a signal that excites the drive, see --input, --reference",
+                     self->run->path, column, x[0], x[self->rows - 1], sqrt(rest));
 }
 
 int arbitrary_cut(const struct run *run, const struct arbitrary_options *options, struct arbitrary *out_self,
@@ -44,5 +81,6 @@ int arbitrary_cut(const struct run *run, const struct arbitrary_options *options
                          "response without periods",
                          run->path, out_self->rows, arbitrary_fewest_rows);
     }
-    return 0;
+    status = check_excites(out_self, out_self->input, out_error);
+    return status || !out_self->reference ? status : check_excites(out_self, out_self->reference, out_error);
 }

@@ -28,8 +28,8 @@ struct arbitrary {
 };
 
 /// Chooses columns and the longest stretch without lost samples.
-/// Errors: error_refused: no such column, numbers that are not finite, an output that stands still, fewer than
-///         arbitrary_fewest_rows rows in one piece
+/// Errors: error_refused: no such column, numbers that are not finite, an output that stands still, an input or a
+///         reference that is a straight line but for rounding, fewer than arbitrary_fewest_rows rows in one piece
 /// Lifetime: `run` must outlive *out_self; nothing needs to be freed
 /// Test:   tests/fault/test_frf_refusals.c
 int arbitrary_cut(const struct run *run, const struct arbitrary_options *options, struct arbitrary *out_self,

@@ -80,14 +80,13 @@ static void copy_line(const struct frf *segment, size_t from, struct frf *io_frf
     }
 }
 
-/// A number of each segment as "[1, 2.5, 3]" under a key; longer than what estimate_set_key() formats.
+/// A number of each segment as "[1, 2.5, 3]" under a key.
 static bool set_list(struct frf *io_frf, const char *key, const struct frf *segments, size_t count,
                      double (*number_of)(const struct frf *segment))
 {
     const size_t size = count * (number_text_size + 2) + 3;
     char *text = malloc(size);
-    if (!text || !estimate_set_key(io_frf, key, "%s", "")) {
-        free(text);
+    if (!text) {
         return false;
     }
     size_t used = (size_t)snprintf(text, size, "[");
@@ -97,10 +96,9 @@ static bool set_list(struct frf *io_frf, const char *key, const struct frf *segm
         used += (size_t)snprintf(text + used, size - used, "%s%s", s ? ", " : "", number);
     }
     snprintf(text + used, size - used, "]");
-    struct run_key *added = &io_frf->keys[io_frf->key_count - 1];
-    free(added->value);
-    added->value = text;
-    return true;
+    const bool set = estimate_set_long_key(io_frf, key, text);
+    free(text);
+    return set;
 }
 
 static double first_hz(const struct frf *segment)
@@ -118,25 +116,6 @@ static double degrees_of(const struct frf *segment)
     return segment->degrees_of_freedom;
 }
 
-/// What all segments say alike holds for the whole; of what differs, only lost periods have a sum that means something.
-static bool set_common_keys(struct frf *io_frf, const struct frf *segments, size_t count)
-{
-    size_t lost = 0;
-    bool set = true;
-    for (size_t k = 0; set && k < segments[0].key_count; k++) {
-        const struct run_key *key = &segments[0].keys[k];
-        bool alike = strcmp(key->key, "lost_periods") != 0;
-        for (size_t s = 1; alike && s < count; s++) {
-            alike = strcmp(estimate_key(&segments[s], key->key), key->value) == 0;
-        }
-        set = !alike || estimate_set_key(io_frf, key->key, "%s", key->value);
-    }
-    for (size_t s = 0; s < count; s++) {
-        lost += strtoul(estimate_key(&segments[s], "lost_periods"), NULL, 10);
-    }
-    return set && (lost == 0 || estimate_set_key(io_frf, "lost_periods", "%zu", lost));
-}
-
 static bool describe(const struct frf *segments, size_t count, struct frf *io_frf)
 {
     io_frf->periods = segments[0].periods;
@@ -148,7 +127,7 @@ static bool describe(const struct frf *segments, size_t count, struct frf *io_fr
     const double factor = circle_confidence_factor(0.95, io_frf->degrees_of_freedom / 2.0);
     return frf_set_text(&io_frf->input, segments[0].input) && frf_set_text(&io_frf->output, segments[0].output) &&
            frf_set_text(&io_frf->units, segments[0].units) && frf_set_text(&io_frf->method, segments[0].method) &&
-           set_common_keys(io_frf, segments, count) &&
+           estimate_set_common_keys(io_frf, segments, count) &&
            (!isfinite(factor) || estimate_set_key(io_frf, "confidence_95_factor", "%.6g", factor)) &&
            estimate_set_key(io_frf, "segments", "%zu", count) &&
            set_list(io_frf, "segment_first_hz", segments, count, first_hz) &&

@@ -13,7 +13,7 @@
 /// Lines:   as they are, standard deviations included; the segments share none
 /// Periods, degrees of freedom: the smallest of all segments, because a response has one number for all lines. So
 ///          confidence_95_factor holds for the segment with the fewest, and is larger than it need be for the others
-/// Keys:    those that all segments have alike; `lost_periods` added up; `segments` and, one number for each,
+/// Keys:    those of estimate_set_common_keys; `segments` and, one number for each,
 ///          `segment_first_hz`, `segment_periods`, `segment_degrees_of_freedom`
 /// Errors:  error_refused if input, output or method differ, if two segments have the same line, or if memory is short;
 ///          *out_frf is empty then

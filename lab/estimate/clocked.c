@@ -7,6 +7,7 @@
 #include "lab/estimate/resample.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 /// Times that the period is measured anew on what was resampled: the first measurement suffers from leakage.
@@ -16,6 +17,8 @@ enum { refinements = 3 };
 static const double arrived_std = 0.5;
 /// Signals that turn by more against each other have no response.
 static const double apart_rad = 0.5;
+/// A period found this near a whole number is taken for one.
+static const double whole_number = 0.05;
 
 /// What is known of the true period: samples + offset + drift x after x periods.
 struct true_period {
@@ -159,6 +162,7 @@ static int resample_until_steady(const struct run *run, const struct periodic_op
     }
     if (!status) {
         report(&first, &period, &io_self->clock);
+        io_self->recording.true_period_samples = (double)period.samples + io_self->clock.both.offset_samples;
     }
     return status;
 }
@@ -174,13 +178,71 @@ static bool search_period(const struct run *run, const struct periodic_options *
         return false;
     }
     struct period_search found;
-    const enum period_search_status status = period_search_run(run_column(run, columns.input), run->rows, &found);
+    double *owned;
+    const double *filled = columns_filled(run, columns.input, &owned);
+    const enum period_search_status status =
+        filled ? period_search_run(filled, run->rows, &found) : period_search_err_memory;
+    free(owned);
     if (status != period_search_ok && status != period_search_err_fraction) {
         return false;
     }
     *out = (struct true_period){.samples = said > 0 ? said : found.period_samples};
     out->offset = found.exact_samples - (double)out->samples;
     return fabs(out->offset) <= CLOCKED_RANGE * (double)out->samples;
+}
+
+/// Compares a period that somebody said with what the input repeats after. A file's own period may be off by a clock,
+/// which is then corrected; a number on the command line where the input repeats after another whole one is a mistake.
+static int check_period(const struct run *run, const char *input, size_t said, bool from_option,
+                        struct error *out_error)
+{
+    struct period_check check;
+    double *owned;
+    const double *filled = columns_filled(run, input, &owned);
+    const enum period_search_status status =
+        filled ? period_search_check(filled, run->rows, said, &check) : period_search_err_memory;
+    free(owned);
+    if (status == period_search_err_memory) {
+        return error_set(out_error, error_refused, "%s: memory is short", run->path);
+    }
+    if (status == period_search_err_none || !check.refuted) {
+        return 0;
+    }
+    const double exact = check.found.exact_samples;
+    const bool is_whole = fabs(exact - round(exact)) <= whole_number;
+    if (run->rows / said >= clock_fewest_periods && fabs(exact - (double)said) <= CLOCKED_RANGE * (double)said &&
+        !(from_option && is_whole)) {
+        return 0;
+    }
+    return error_set(out_error, error_refused,
+                     "%s: %s %zu: %s repeats every %.9g samples (correlation %.6g), not every %zu (%.6g): expected "
+                     "--period %zu",
+                     run->path, from_option ? "--period" : "period_samples is", said, input,
+                     is_whole ? round(exact) : exact, check.found.correlation, said, check.correlation,
+                     check.found.period_samples);
+}
+
+/// Before anything is cut by it.
+static int check_option(const struct run *run, const struct periodic_options *options, struct error *out_error)
+{
+    struct columns columns;
+    const struct columns wanted = {options->input, options->output, options->reference};
+    if (options->period_samples == 0 || options->period_samples == run->period_samples) {
+        return 0;
+    }
+    int status = columns_choose(run, &wanted, &columns, out_error);
+    return status ? status : check_period(run, columns.input, options->period_samples, true, out_error);
+}
+
+/// The file's own period, where clock_measure cannot tell.
+static int check_key(const struct run *run, const struct clocked *self, struct error *out_error)
+{
+    const struct periodic *recording = &self->recording;
+    const bool tested = self->clock.state != clock_untested && self->clock.coherent;
+    if (tested || recording->period_found || recording->period_samples != run->period_samples) {
+        return 0;
+    }
+    return check_period(run, recording->input, recording->period_samples, false, out_error);
 }
 
 static int judge(const struct run *run, const struct periodic_options *options, bool strict, struct clocked *io_self,
@@ -209,7 +271,8 @@ int clocked_cut(const struct run *run, const struct periodic_options *options, b
 {
     struct true_period period;
     *out_self = (struct clocked){.is_resampled = false};
-    int status = periodic_cut(run, options, &out_self->recording, out_error);
+    int status = check_option(run, options, out_error);
+    status = status ? status : periodic_cut(run, options, &out_self->recording, out_error);
     if (status && out_self->recording.aperiodic) {
         if (!search_period(run, options, 0, &period)) {
             return status;
@@ -222,6 +285,7 @@ int clocked_cut(const struct run *run, const struct periodic_options *options, b
         return status;
     }
     status = measure(run, options, out_self, out_error);
+    status = status ? status : check_key(run, out_self, out_error);
     status = status ? status : judge(run, options, strict, out_self, out_error);
     if (status) {
         clocked_free(out_self);

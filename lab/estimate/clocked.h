@@ -26,9 +26,14 @@ struct clocked {
 /// fractions of a sample included. Offsets that do not matter are left alone, unless `strict`: then every certain one
 /// is corrected, for responses that further recordings make more certain.
 ///
+/// A period that somebody said is compared with what the input repeats after (period_search_check): always if the
+/// options say it, else where clock_measure cannot (fewer than 4 periods, or one does not resemble the next).
+///
 /// Errors: as periodic_cut (recording.aperiodic included); error_refused with the figures: input and output keep
 ///         different clocks (they turn by more than 0.5 rad against each other), lines above RESAMPLE_BAND would get
-///         lost. *out_self needs no freeing then. `run` must outlive it
+///         lost, the input repeats after another period than the one said (the options': another whole number, or more
+///         than CLOCKED_RANGE off; the run's: more than CLOCKED_RANGE, or too few periods for clock_measure).
+///         *out_self needs no freeing then. `run` must outlive it
 /// Test:   tests/unit/test_clock.c
 int clocked_cut(const struct run *run, const struct periodic_options *options, bool strict, struct clocked *out_self,
                 struct error *out_error);

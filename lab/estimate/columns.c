@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/columns.h"
 
+#include "lab/numeric/clones.h"
+
 #include <math.h>
 #include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static const char *const usual_inputs[] = {"torque_Nm", "force_N", "current_A", "voltage_V", NULL};
 static const char *const usual_outputs[] = {"velocity_rad_per_s", "velocity_m_per_s", "position_rad", "position_m",
                                             NULL};
-static const char *const usual_references[] = {"velocity_ref_rad_per_s",
-                                               "velocity_ref_m_per_s",
-                                               "position_ref_rad",
-                                               "position_ref_m",
-                                               "torque_ref_Nm",
-                                               "force_ref_N",
-                                               NULL};
+static const char *const usual_references[] = {"velocity_ref_rad_per_s", "velocity_ref_m_per_s", "position_ref_rad",
+                                               "position_ref_m",         "torque_ref_Nm",        "force_ref_N",
+                                               "current_ref_A",          "voltage_ref_V",        NULL};
 
 static const char *own_name(const struct run *run, const char *name)
 {
@@ -26,15 +26,43 @@ static const char *own_name(const struct run *run, const char *name)
     return NULL;
 }
 
+static bool is_lost(const double *valid, size_t row)
+{
+    return valid && !(valid[row] > 0.5);
+}
+
 static bool changes(const struct run *run, const char *name)
 {
     const double *values = run_column(run, name);
-    for (size_t n = 1; n < run->rows; n++) {
-        if (values[n] != values[0]) {
+    const double *valid = run_column(run, "valid");
+    size_t first = 0;
+    while (first < run->rows && is_lost(valid, first)) {
+        first++;
+    }
+    for (size_t n = first + 1; n < run->rows; n++) {
+        if (values[n] != values[first] && !is_lost(valid, n)) {
             return true;
         }
     }
     return false;
+}
+
+enum { names_size = 400 };
+
+/// The columns there are: "t_s, iq_A, ...", as many as there is room for.
+static void list_columns(const struct run *run, char out_text[names_size])
+{
+    size_t used = 0;
+    out_text[0] = '\0';
+    for (size_t c = 0; c < run->column_count; c++) {
+        const char *name = run->columns[c].name;
+        const char *comma = c > 0 ? ", " : "";
+        if (used + strlen(comma) + strlen(name) + sizeof ", ..." > names_size) {
+            snprintf(out_text + used, names_size - used, ", ...");
+            return;
+        }
+        used += (size_t)snprintf(out_text + used, names_size - used, "%s%s", comma, name);
+    }
 }
 
 static int choose_column(const struct run *run, const char *what, const char *wanted, const char *const *usual,
@@ -47,15 +75,18 @@ static int choose_column(const struct run *run, const char *what, const char *wa
     if (*out_name) {
         return 0;
     }
+    char names[names_size];
+    list_columns(run, names);
     if (wanted) {
-        return error_set(out_error, error_refused, "%s: no column '%s' to take as the %s", run->path, wanted, what);
+        return error_set(out_error, error_refused, "%s: no column '%s' to take as the %s, only: %s", run->path, wanted,
+                         what, names);
     }
-    return error_set(out_error, error_refused, "%s: no %s column: expected %s, %s, %s or %s, or --%s COLUMN", run->path,
-                     what, usual[0], usual[1], usual[2], usual[3], what);
+    return error_set(out_error, error_refused, "%s: no %s column among: %s: expected %s, %s, %s or %s, or --%s COLUMN",
+                     run->path, what, names, usual[0], usual[1], usual[2], usual[3], what);
 }
 
 /// x - x is 0 for every finite number; four sums, because one would wait for its own last addition.
-static bool all_finite(const double *x, size_t count)
+CLONED_FOR_AVX2 static bool all_finite(const double *x, size_t count)
 {
     double sums[4] = {0.0};
     size_t n = 0;
@@ -101,7 +132,10 @@ static int choose_reference(const struct run *run, const char *wanted, struct co
 {
     io_columns->reference = wanted ? own_name(run, wanted) : default_reference(run);
     if (wanted && !io_columns->reference) {
-        return error_set(out_error, error_refused, "%s: no column '%s' to take as the reference", run->path, wanted);
+        char names[names_size];
+        list_columns(run, names);
+        return error_set(out_error, error_refused, "%s: no column '%s' to take as the reference, only: %s", run->path,
+                         wanted, names);
     }
     if (wanted && !changes(run, wanted)) {
         return error_set(out_error, error_refused,
@@ -109,6 +143,29 @@ static int choose_reference(const struct run *run, const char *wanted, struct co
                          run->path, wanted);
     }
     return !io_columns->reference || finite_column(run, io_columns->reference, out_error) ? 0 : error_refused;
+}
+
+/// A constant has no power on any line, and what rounding makes of it would pass for some.
+static int check_motion(const struct run *run, const struct columns *columns, struct error *out_error)
+{
+    if (strcmp(columns->input, columns->output) == 0) {
+        return error_set(out_error, error_refused,
+                         "%s: input and output are both %s: expected two signals, see --input, --output", run->path,
+                         columns->input);
+    }
+    if (!changes(run, columns->input)) {
+        return error_set(out_error, error_refused,
+                         "%s: %s is %.9g in all %zu rows, it has no power on any line: expected a signal that excites "
+                         "the drive, see --input",
+                         run->path, columns->input, run_column(run, columns->input)[0] + 0.0, run->rows);
+    }
+    if (!changes(run, columns->output)) {
+        return error_set(out_error, error_refused,
+                         "%s: %s does not change, it is %.9g in all %zu rows: expected an axis that moves, see "
+                         "--output",
+                         run->path, columns->output, run_column(run, columns->output)[0] + 0.0, run->rows);
+    }
+    return 0;
 }
 
 int columns_choose(const struct run *run, const struct columns *wanted, struct columns *out_columns,
@@ -125,11 +182,7 @@ int columns_choose(const struct run *run, const struct columns *wanted, struct c
     if (!finite_column(run, out_columns->input, out_error) || !finite_column(run, out_columns->output, out_error)) {
         return error_refused;
     }
-    if (!changes(run, out_columns->output)) {
-        return error_set(out_error, error_refused, "%s: %s does not change: expected an axis that moves, see --output",
-                         run->path, out_columns->output);
-    }
-    return 0;
+    return check_motion(run, out_columns, out_error);
 }
 
 bool columns_closed_loop(const struct columns *self)
@@ -155,9 +208,46 @@ size_t columns_first_lost_row(const struct run *run, size_t first, size_t rows)
 {
     const double *valid = run_column(run, "valid");
     for (size_t row = first; valid && row < first + rows; row++) {
-        if (!(valid[row] > 0.5)) {
+        if (is_lost(valid, row)) {
             return row + 1;
         }
     }
     return 0;
+}
+
+/// Straight line over the rows `first` to `end` - 1 from the one before to the one behind, if they are there.
+static void fill_gap(double *values, size_t first, size_t end, size_t rows)
+{
+    const double low = first > 0 ? values[first - 1] : end < rows ? values[end] : 0.0;
+    const double high = end < rows ? values[end] : low;
+    const double width = (double)(end - first) + 1.0;
+    for (size_t n = first; n < end; n++) {
+        values[n] = low + (high - low) * ((double)(n - first) + 1.0) / width;
+    }
+}
+
+const double *columns_filled(const struct run *run, const char *name, double **out_owned)
+{
+    const double *valid = run_column(run, "valid");
+    const double *values = run_column(run, name);
+    *out_owned = NULL;
+    if (columns_first_lost_row(run, 0, run->rows) == 0) {
+        return values;
+    }
+    double *filled = malloc(run->rows * sizeof *filled);
+    if (!filled) {
+        return NULL;
+    }
+    memcpy(filled, values, run->rows * sizeof *filled);
+    for (size_t row = 0; row < run->rows; row++) {
+        const size_t first = row;
+        while (row < run->rows && is_lost(valid, row)) {
+            row++;
+        }
+        if (row > first) {
+            fill_gap(filled, first, row, run->rows);
+        }
+    }
+    *out_owned = filled;
+    return filled;
 }

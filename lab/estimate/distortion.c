@@ -8,6 +8,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+enum { fewest_of_found_grid = 8 };
+
 static const double two_pi = 6.283185307179586476925;
 
 static const double false_alarms = 0.05;
@@ -47,6 +49,21 @@ struct grid {
     bool *excited; ///< highest + 1
 };
 
+/// Where lines were found by their power, a bin with power may be one that was missed, and is not called distortion;
+/// nor does a handful of lines that happen to be odd make a grid of odd ones.
+static void keep_doubtful(const struct periodic *recording, struct grid *io_grid)
+{
+    for (size_t b = 0; io_grid->excited && b < recording->doubtful_count; b++) {
+        const uint32_t bin = recording->doubtful[b];
+        if (bin % io_grid->spacing == 0 && bin / io_grid->spacing <= io_grid->highest) {
+            io_grid->excited[bin / io_grid->spacing] = true;
+        }
+    }
+    if (recording->bins_found && recording->bin_count < fewest_of_found_grid) {
+        io_grid->odd_only = false;
+    }
+}
+
 static bool make_grid(const struct periodic *recording, const struct distortion_options *options, struct grid *out)
 {
     *out = (struct grid){.odd_only = true};
@@ -71,6 +88,7 @@ static bool make_grid(const struct periodic *recording, const struct distortion_
         }
         out->odd_only = out->odd_only && multiple % 2 == 1;
     }
+    keep_doubtful(recording, out);
     return out->excited != NULL;
 }
 

@@ -4,6 +4,7 @@
 #include "lab/estimate/circle.h"
 #include "lab/estimate/method.h"
 #include "lab/estimate/ratio.h"
+#include "lab/estimate/resolution.h"
 #include "lab/estimate/segments.h"
 
 #include <math.h>
@@ -72,6 +73,12 @@ int frf_h1_estimate_arbitrary(const struct arbitrary *recording, const struct es
     if (!status) {
         estimate_lines(&spectra, out_frf);
         status = estimate_end_arbitrary(recording, out_frf, out_error);
+    }
+    if (!status) {
+        /* Against the input itself, as this method has it. */
+        struct arbitrary open = *recording;
+        open.reference = NULL;
+        status = resolution_enlarge(&open, &spectra, out_frf, out_error);
     }
     if (!status && !(estimate_set_key(out_frf, "segment_samples", "%zu", segments.samples) &&
                      estimate_set_key(out_frf, "segments", "%zu", segments.count) &&

@@ -18,8 +18,9 @@
 int frf_h1_estimate(const struct periodic *recording, const struct estimate_options *options, struct frf *out_frf,
                     struct error *out_error);
 
-/// Takes overlapping segments with a Hann window (segments_transform); degrees of freedom 2 (nu - 1).
-/// Keys:      warning, segment_samples, segments
+/// Takes overlapping segments with a Hann window (segments_transform); degrees of freedom 2 (nu - 1). What segments too
+/// short for a resonance move its lines by is in std (resolution_enlarge).
+/// Keys:      warning, warning_resolution, segment_samples, segments
 int frf_h1_estimate_arbitrary(const struct arbitrary *recording, const struct estimate_options *options,
                               struct frf *out_frf, struct error *out_error);
 

@@ -3,6 +3,7 @@
 
 #include "lab/estimate/method.h"
 #include "lab/estimate/ratio.h"
+#include "lab/estimate/resolution.h"
 #include "lab/estimate/segments.h"
 
 #include <math.h>
@@ -14,8 +15,8 @@ static int check_reference(const struct run *run, const char *reference, const c
     if (!reference) {
         return error_set(out_error, error_refused,
                          "%s: method indirect divides by the signal that excites the loop: no column "
-                         "velocity_ref_rad_per_s, position_ref_rad or torque_ref_Nm that changes, say --reference "
-                         "COLUMN",
+                         "velocity_ref_rad_per_s, position_ref_rad, torque_ref_Nm, current_ref_A or the like that "
+                         "changes, say --reference COLUMN",
                          run->path);
     }
     if (strcmp(reference, input) == 0) {
@@ -93,6 +94,7 @@ int frf_indirect_estimate_arbitrary(const struct arbitrary *recording, const str
         estimate_lines(&spectra, out_frf);
         status = estimate_end_arbitrary(recording, out_frf, out_error);
     }
+    status = status ? status : resolution_enlarge(recording, &spectra, out_frf, out_error);
     if (!status && !(estimate_set_key(out_frf, "segment_samples", "%zu", segments.samples) &&
                      estimate_set_key(out_frf, "segments", "%zu", segments.count))) {
         status = estimate_refuse_memory(out_frf, out_error);

@@ -18,7 +18,8 @@
 int frf_indirect_estimate(const struct periodic *recording, const struct estimate_options *options, struct frf *out_frf,
                           struct error *out_error);
 
-/// Takes overlapping segments with a Hann window (segments_transform); degrees of freedom 2 (nu - 1).
+/// Takes overlapping segments with a Hann window (segments_transform); degrees of freedom 2 (nu - 1). What segments too
+/// short for a resonance move its lines by is in std (resolution_enlarge).
 int frf_indirect_estimate_arbitrary(const struct arbitrary *recording, const struct estimate_options *options,
                                     struct frf *out_frf, struct error *out_error);
 

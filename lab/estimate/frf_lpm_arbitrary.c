@@ -192,3 +192,30 @@ int frf_lpm_estimate_arbitrary(const struct arbitrary *recording, const struct e
     free_fit(&self);
     return status;
 }
+
+bool frf_lpm_arbitrary_at(const struct arbitrary *recording, const double *frequency_hz, size_t count,
+                          double complex *out_response, double *out_std)
+{
+    const struct estimate_options options = {.order = estimate_order_auto};
+    const double lines_per_hz = (double)recording->rows / recording->run->sample_rate_hz;
+    struct fit self = {.recording = recording};
+    struct error ignored;
+    for (size_t k = 0; k < count; k++) {
+        out_response[k] = 0.0;
+        out_std[k] = INFINITY;
+    }
+    if (plan(&options, &self, &ignored)) {
+        return true;
+    }
+    const bool done = allocate_and_transform(&self);
+    for (size_t k = 0; k < count && done; k++) {
+        const size_t centre = (size_t)llround(frequency_hz[k] * lines_per_hz);
+        double variance;
+        if (centre > self.half_width && centre + self.half_width <= (recording->rows - 1) / 2 &&
+            fit_line(&self, centre, &out_response[k], &variance)) {
+            out_std[k] = sqrt(variance);
+        }
+    }
+    free_fit(&self);
+    return done;
+}

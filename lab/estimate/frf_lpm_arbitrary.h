@@ -7,6 +7,10 @@
 #include "lab/estimate/options.h"
 #include "lab/record/frf_file.h"
 
+#include <complex.h>
+#include <stdbool.h>
+#include <stddef.h>
+
 /// Fits the lines around every n-th line of the whole record's spectrum.
 ///
 /// Equation:  X(k + r) = sum_s (g_s r^s Z(k + r) + t_s r^s) + V(k + r), r = -n..n, s = 0..R, with X the output, and the
@@ -25,5 +29,11 @@
 /// Test:      tests/unit/test_frf_lpm_arbitrary.c
 int frf_lpm_estimate_arbitrary(const struct arbitrary *recording, const struct estimate_options *options,
                                struct frf *out_frf, struct error *out_error);
+
+/// The same, order 2, at the record's lines nearest to chosen frequencies.
+/// Shapes: frequency_hz, out_response, out_std: count; out_std is INFINITY where there is no valid line
+/// Errors: false if memory is short; where the record is too short for the method no line is valid
+bool frf_lpm_arbitrary_at(const struct arbitrary *recording, const double *frequency_hz, size_t count,
+                          double complex *out_response, double *out_std);
 
 #endif

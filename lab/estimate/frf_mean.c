@@ -3,6 +3,7 @@
 
 #include "lab/estimate/circle.h"
 #include "lab/estimate/method.h"
+#include "lab/numeric/clones.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -29,7 +30,7 @@ struct block {
     double residual[block_lines];      ///< sum |(Y_m - Ybar) - G (U_m - Ubar)|^2
 };
 
-static void sum_means(const struct periodic *recording, size_t first, size_t lines, struct block *out)
+CLONED_FOR_AVX2 static void sum_means(const struct periodic *recording, size_t first, size_t lines, struct block *out)
 {
     memset(out, 0, sizeof *out);
     for (size_t m = 0; m < recording->used; m++) {
@@ -45,8 +46,8 @@ static void sum_means(const struct periodic *recording, size_t first, size_t lin
     }
 }
 
-static void sum_scatter(const struct periodic *recording, size_t first, size_t lines, const double complex *responses,
-                        struct block *io_block)
+CLONED_FOR_AVX2 static void sum_scatter(const struct periodic *recording, size_t first, size_t lines,
+                                        const double complex *responses, struct block *io_block)
 {
     for (size_t m = 0; m < recording->used; m++) {
         size_t row = m * recording->bin_count + first;
@@ -71,7 +72,11 @@ static void estimate_block(const struct periodic *recording, size_t first, size_
     double certain_ratio = circle_certain_ratio(estimate_chance_of_dead_line, recording->used);
     sum_means(recording, first, lines, io_block);
     for (size_t b = 0; b < lines; b++) {
-        responses[b] = io_block->output[b] / io_block->input[b];
+        /* Part by part: a quotient of complex numbers would look for infinities each time. */
+        const double complex u = io_block->input[b];
+        const double complex y = io_block->output[b];
+        responses[b] = CMPLX((creal(y) * creal(u) + cimag(y) * cimag(u)) / power(u),
+                             (cimag(y) * creal(u) - creal(y) * cimag(u)) / power(u));
     }
     sum_scatter(recording, first, lines, responses, io_block);
     for (size_t b = 0; b < lines; b++) {

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/inputs.h"
 
+#include "lab/estimate/columns.h"
+#include "lab/estimate/line_search.h"
 #include "lab/estimate/period_search.h"
 #include "lab/estimate/spectra.h"
 
@@ -165,8 +167,11 @@ static int choose_period(const struct run *run, const struct inputs_known *known
                   : known->design       ? known->design->period_samples
                                         : run->period_samples;
     struct period_search found;
-    if (*out_period == 0 && period_search_run(run_column(run, self->names[0]), run->rows, &found) == period_search_ok) {
-        *out_period = found.period_samples;
+    double *owned;
+    const double *filled = *out_period == 0 ? columns_filled(run, self->names[0], &owned) : NULL;
+    if (filled) {
+        *out_period = period_search_run(filled, run->rows, &found) == period_search_ok ? found.period_samples : 0;
+        free(owned);
     }
     if (*out_period < 3 || run->rows / *out_period < 2) {
         return error_set(out_error, error_refused,
@@ -185,49 +190,63 @@ struct strengths {
     bool *excited; ///< by anybody
 };
 
-static bool measure_input(const struct run *run, size_t input, const char *name, struct strengths *io)
+/// Magnitudes of the mean spectrum.
+static void measure_magnitudes(const struct line_search *search, size_t input, struct strengths *io)
 {
-    const size_t total = run->rows / io->period;
-    const size_t first = total > 2 ? 1 : 0; // it holds the transient
-    const size_t all = io->period / 2 + 1;
-    const double *signal = run_column(run, name) + first * io->period;
-    double complex *spectra = malloc((total - first) * all * sizeof *spectra);
-    uint32_t *found = malloc(all * sizeof *found);
-    size_t found_count = 0;
-    bool done = spectra && found && spectra_transform_all(signal, io->period, total - first, spectra) &&
-                period_search_bins(spectra, total - first, io->bins, all, found, &found_count);
-    for (size_t k = 1; k < io->bins && done; k++) {
+    const size_t all = search->period_samples / 2 + 1;
+    for (size_t k = 1; k < io->bins; k++) {
         double complex mean = 0.0;
-        for (size_t m = 0; m < total - first; m++) {
-            mean += spectra[m * all + k] / (double)(total - first);
+        for (size_t m = 0; m < search->periods; m++) {
+            mean += search->spectra[m * all + k] / (double)search->periods;
         }
         io->magnitude[input * io->bins + k] = cabs(mean);
         io->strongest[input] = fmax(io->strongest[input], cabs(mean));
     }
-    for (size_t b = 0; b < found_count && done; b++) {
-        io->excited[found[b]] = true;
-    }
-    free(spectra);
-    free(found);
-    return done;
 }
 
-static bool measure_strengths(const struct run *run, const struct inputs *self, size_t period, struct strengths *out)
+static int measure_input(const struct run *run, size_t input, const char *name, struct strengths *io,
+                         struct error *out_error)
+{
+    struct line_search search;
+    struct line_search_result found = {.count = 0};
+    int status = 0;
+    if (!line_search_transform(run, name, io->period, run->rows / io->period, &search)) {
+        status = refuse_memory(run, out_error);
+    } else if (search.periods < 2) {
+        status =
+            error_set(out_error, error_refused,
+                      "%s: %zu of %zu periods have no lost sample: expected at least 2 for the lines of each input",
+                      run->path, search.periods, run->rows / io->period);
+    } else if (!line_search_run(&search, &found)) {
+        status = refuse_memory(run, out_error);
+    } else {
+        measure_magnitudes(&search, input, io);
+    }
+    for (size_t b = 0; b < found.count && !status; b++) {
+        io->excited[found.bins[b]] = true;
+    }
+    line_search_result_free(&found);
+    line_search_free(&search);
+    return status;
+}
+
+static int measure_strengths(const struct run *run, const struct inputs *self, size_t period, struct strengths *out,
+                             struct error *out_error)
 {
     *out = (struct strengths){.period = period, .bins = (period + 1) / 2};
     out->magnitude = calloc(self->count * out->bins, sizeof *out->magnitude);
     out->excited = calloc(out->bins, sizeof *out->excited);
-    bool done = out->magnitude && out->excited;
-    for (size_t p = 0; p < self->count && done; p++) {
-        done = measure_input(run, p, self->names[p], out);
+    int status = out->magnitude && out->excited ? 0 : refuse_memory(run, out_error);
+    for (size_t p = 0; p < self->count && !status; p++) {
+        status = measure_input(run, p, self->names[p], out, out_error);
     }
-    if (done && run->bins && run->period_samples == period) {
+    if (!status && run->bins && run->period_samples == period) {
         memset(out->excited, 0, out->bins * sizeof *out->excited);
         for (size_t b = 0; b < run->bin_count && run->bins[b] < out->bins; b++) {
             out->excited[run->bins[b]] = true;
         }
     }
-    return done;
+    return status;
 }
 
 static double share_of(const struct strengths *strengths, size_t input, size_t bin)
@@ -319,9 +338,7 @@ int inputs_find(const struct run *run, const struct inputs_known *known, struct 
         status = check_finite(run, out_self->names[p], out_error);
     }
     status = status ? status : choose_period(run, known, out_self, &period, out_error);
-    if (!status && !measure_strengths(run, out_self, period, &strengths)) {
-        status = refuse_memory(run, out_error);
-    }
+    status = status ? status : measure_strengths(run, out_self, period, &strengths, out_error);
     if (!status) {
         status = known->design ? take_from_design(run, known, out_self, out_error)
                                : divide_by_power(run, &strengths, out_self, out_error);

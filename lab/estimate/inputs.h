@@ -42,7 +42,7 @@ struct inputs_known {
 /// Finds the lines of each input.
 ///
 /// design:    the segment that the run's key `segment` ("2 of 8") names, or its only one
-/// by power:  of the run's excited_bins, or of all bins that repeat with power (period_search_bins), each is the line
+/// by power:  of the run's excited_bins, or of all bins that repeat with power (line_search_run), each is the line
 /// of
 ///            the input that has most there, in shares of its own strongest bin
 /// Errors:    error_refused: no two inputs, another period or number of inputs than the design's, no segment named, an

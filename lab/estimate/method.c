@@ -10,6 +10,7 @@
 #include "lab/estimate/frf_lpm_arbitrary.h"
 #include "lab/estimate/frf_mean.h"
 #include "lab/estimate/parametric_frf.h"
+#include "lab/record/number.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -80,13 +81,8 @@ const char *estimate_key(const struct frf *frf, const char *key)
     return "";
 }
 
-bool estimate_set_key(struct frf *io_frf, const char *key, const char *format, ...)
+bool estimate_set_long_key(struct frf *io_frf, const char *key, const char *text)
 {
-    char text[512];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
     for (size_t i = 0; i < io_frf->key_count; i++) {
         if (strcmp(io_frf->keys[i].key, key) == 0) {
             return frf_set_text(&io_frf->keys[i].value, text);
@@ -105,6 +101,16 @@ bool estimate_set_key(struct frf *io_frf, const char *key, const char *format, .
     }
     io_frf->key_count++;
     return true;
+}
+
+bool estimate_set_key(struct frf *io_frf, const char *key, const char *format, ...)
+{
+    char text[800];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    return estimate_set_long_key(io_frf, key, text);
 }
 
 int estimate_refuse_memory(struct frf *io_frf, struct error *out_error)
@@ -203,15 +209,48 @@ bool estimate_set_confidence(struct frf *io_frf)
     return estimate_set_key(io_frf, "confidence_95_factor", "%.6g", factor);
 }
 
+/// Lines without input (periodic_cut) have no response, whatever a method made of rounding.
+static void drop_silent_lines(const struct periodic *recording, struct frf *io_frf)
+{
+    for (size_t line = 0; line < io_frf->count && io_frf->count == recording->bin_count; line++) {
+        if (recording->input_spectra[line] == 0.0) {
+            estimate_set_line(io_frf, line, 0.0, INFINITY);
+        }
+    }
+}
+
+/// The figures of the line that stands out most.
+static int refuse_scatter(const struct periodic *recording, struct error *out_error)
+{
+    const double to_amplitude = 2.0 / (double)recording->period_samples;
+    double best = -1.0;
+    size_t strongest = 0;
+    struct circle line = {0};
+    for (size_t b = 0; b < recording->bin_count; b++) {
+        const struct circle one = circle_of_column(recording->input_spectra, recording->used, recording->bin_count, b);
+        const double ratio = one.variance > 0.0 ? cabs(one.mean) / sqrt(one.variance) : 0.0;
+        if (ratio > best) {
+            best = ratio;
+            strongest = b;
+            line = one;
+        }
+    }
+    return error_set(
+        out_error, error_refused,
+        "%s: %s has no power above its scatter on any of %zu lines: the clearest, %.6g Hz, has an "
+        "amplitude of %.3g, and %zu periods leave it uncertain by %.3g: expected an excited input, see "
+        "--input, --lines, or more periods",
+        recording->run->path, recording->input, recording->bin_count,
+        (double)recording->bins[strongest] * recording->run->sample_rate_hz / (double)recording->period_samples,
+        to_amplitude * cabs(line.mean), recording->used, to_amplitude * sqrt(line.variance / (double)recording->used));
+}
+
 int estimate_end(const struct periodic *recording, struct frf *io_frf, struct error *out_error)
 {
+    drop_silent_lines(recording, io_frf);
     if (valid_lines(io_frf) == 0) {
         frf_free(io_frf);
-        return error_set(
-            out_error, error_refused,
-            "%s: %s has no power above its scatter on any of %zu lines: expected an excited input, see --input, "
-            "--lines",
-            recording->run->path, recording->input, recording->bin_count);
+        return refuse_scatter(recording, out_error);
     }
     bool set = estimate_set_confidence(io_frf) &&
                estimate_set_key(io_frf, "settle_periods", "%zu", recording->settle) &&
@@ -258,10 +297,13 @@ bool estimate_warn_of_feedback(const char *reference, struct frf *io_frf)
 
 bool estimate_warn_of_reference(const char *reference, struct frf *io_frf)
 {
-    if (strcmp(reference, "torque_ref_Nm") != 0 && strcmp(reference, "force_ref_N") != 0) {
-        return true;
+    static const char *const asked_for[] = {"torque_ref_Nm", "force_ref_N", "current_ref_A", "voltage_ref_V"};
+    bool from_controller = false;
+    for (size_t i = 0; i < sizeof asked_for / sizeof asked_for[0]; i++) {
+        from_controller = from_controller || strcmp(reference, asked_for[i]) == 0;
     }
-    return estimate_set_key(io_frf, "warning",
+    return !from_controller ||
+           estimate_set_key(io_frf, "warning",
                             "%s is what the controller asks for: it excites from outside only if no loop is closed "
                             "around it",
                             reference);
@@ -339,15 +381,37 @@ static void average_line(const struct frf *realisations, size_t count, size_t li
     }
 }
 
-int estimate_average(const struct frf *realisations, size_t count, struct frf *out_frf, struct error *out_error)
+bool estimate_set_common_keys(struct frf *io_frf, const struct frf *responses, size_t count)
 {
-    const struct frf *first = &realisations[0];
-    *out_frf = (struct frf){0};
-    if (count < 2) {
-        return error_set(out_error, error_refused, "%zu realisations: expected at least 2 to average", count);
+    size_t lost = 0;
+    double rate_hz = 0.0;
+    bool set = true;
+    for (size_t k = 0; set && k < responses[0].key_count; k++) {
+        const struct run_key *key = &responses[0].keys[k];
+        bool alike = strcmp(key->key, "lost_periods") != 0;
+        for (size_t r = 1; alike && r < count; r++) {
+            alike = strcmp(estimate_key(&responses[r], key->key), key->value) == 0;
+        }
+        set = !alike || estimate_set_long_key(io_frf, key->key, key->value);
     }
+    for (size_t r = 0; r < count; r++) {
+        double rate;
+        const char *text = estimate_key(&responses[r], "sample_rate_hz");
+        rate_hz += number_parse(text, strlen(text), &rate) == number_ok ? rate / (double)count : NAN;
+        lost += strtoul(estimate_key(&responses[r], "lost_periods"), NULL, 10);
+    }
+    if (set && isfinite(rate_hz) && !estimate_key(io_frf, "sample_rate_hz")[0]) {
+        set = estimate_set_key(io_frf, "sample_rate_hz", "%.17g", rate_hz);
+    }
+    return set && (lost == 0 || estimate_set_key(io_frf, "lost_periods", "%zu", lost));
+}
+
+int estimate_begin_common(const struct frf *responses, size_t count, struct frf *out_frf, struct error *out_error)
+{
+    const struct frf *first = &responses[0];
+    *out_frf = (struct frf){0};
     for (size_t r = 1; r < count; r++) {
-        int status = check_same(first, &realisations[r], r + 1, out_error);
+        int status = check_same(first, &responses[r], r + 1, out_error);
         if (status) {
             return status;
         }
@@ -357,17 +421,33 @@ int estimate_average(const struct frf *realisations, size_t count, struct frf *o
         return status;
     }
     if (!frf_set_text(&out_frf->input, first->input) || !frf_set_text(&out_frf->output, first->output) ||
-        !frf_set_text(&out_frf->units, first->units) || !frf_set_text(&out_frf->method, first->method)) {
+        !frf_set_text(&out_frf->units, first->units) || !frf_set_text(&out_frf->method, first->method) ||
+        !estimate_set_common_keys(out_frf, responses, count)) {
         return estimate_refuse_memory(out_frf, out_error);
+    }
+    for (size_t r = 0; r < count; r++) {
+        out_frf->periods += responses[r].periods;
+    }
+    memcpy(out_frf->frequency_hz, first->frequency_hz, first->count * sizeof *out_frf->frequency_hz);
+    return 0;
+}
+
+int estimate_average(const struct frf *realisations, size_t count, struct frf *out_frf, struct error *out_error)
+{
+    *out_frf = (struct frf){0};
+    if (count < 2) {
+        return error_set(out_error, error_refused, "%zu realisations: expected at least 2 to average", count);
+    }
+    int status = estimate_begin_common(realisations, count, out_frf, out_error);
+    if (status) {
+        return status;
     }
     double noise_degrees = 0.0;
     for (size_t r = 0; r < count; r++) {
-        out_frf->periods += realisations[r].periods;
         noise_degrees += realisations[r].degrees_of_freedom;
     }
     out_frf->degrees_of_freedom = 2.0 * (double)(count - 1);
-    memcpy(out_frf->frequency_hz, first->frequency_hz, first->count * sizeof *out_frf->frequency_hz);
-    for (size_t line = 0; line < first->count; line++) {
+    for (size_t line = 0; line < out_frf->count; line++) {
         average_line(realisations, count, line, out_frf);
     }
     if (!estimate_set_confidence(out_frf) || !estimate_set_key(out_frf, "realisations", "%zu", count) ||

@@ -73,6 +73,19 @@ bool estimate_set_key(struct frf *io_frf, const char *key, const char *format, .
 #endif
     ;
 
+/// The same for a text of any length; estimate_set_key() cuts at 799 characters.
+bool estimate_set_long_key(struct frf *io_frf, const char *key, const char *text);
+
+/// For what puts several responses together: allocates one with the frequencies, names, units and method of the first,
+/// the sum of their periods, and the keys that all of them say alike, lost_periods added up and sample_rate_hz as their
+/// mean. Lines and degrees of freedom are left to the caller.
+/// Errors: error_refused if the lines (by more than 0.05 % of their frequency or a tenth of their distance) or the
+///         names of input and output differ; *out_frf is empty then
+int estimate_begin_common(const struct frf *responses, size_t count, struct frf *out_frf, struct error *out_error);
+
+/// The keys of that. Errors: false if memory is short.
+bool estimate_set_common_keys(struct frf *io_frf, const struct frf *responses, size_t count);
+
 /// Averages the responses of several realisations (runs with other phases or levels, same lines) with equal weights.
 ///
 /// Equation:  G = mean G_r;  noise_std = sqrt(sum noise_std_r^2) / R
@@ -80,8 +93,8 @@ bool estimate_set_key(struct frf *io_frf, const char *key, const char *format, .
 ///            distortion levels: root of their mean power, where every realisation has one
 /// Validity:  a line is valid if it is in every realisation; degrees of freedom 2, of noise_std the sum of all
 ///            realisations' (key noise_degrees_of_freedom). Whether they differ: agreement.h
-/// Errors:    error_refused if the lines (by more than 0.05 % of their frequency or a tenth of their distance) or
-///            the names of input and output differ; *out_frf is empty then
+/// Keys:      as estimate_begin_common, realisations, noise_degrees_of_freedom
+/// Errors:    as estimate_begin_common
 int estimate_average(const struct frf *realisations, size_t count, struct frf *out_frf, struct error *out_error);
 
 #endif

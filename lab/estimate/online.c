@@ -486,8 +486,12 @@ int online_end(struct online *self, double rate_hz, struct online_result *out_re
     whole.used = out_result->used;
     status = estimate_begin(&whole, "mean", 2.0 * (double)(whole.used - 1), out_frf, out_error);
     const double certain_ratio = circle_certain_ratio(estimate_chance_of_dead_line, whole.used);
+    bool any = false;
     for (size_t b = 0; b < whole.bin_count && !status; b++) {
         set_line(self, out_result, b, certain_ratio, out_frf);
+        any = any || out_frf->valid[b];
     }
+    /* The figures of a refusal are those of the spectra that are there. */
+    whole.used = any ? whole.used : self->leading->used;
     return status ? status : estimate_end(&whole, out_frf, out_error);
 }

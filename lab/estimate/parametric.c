@@ -12,6 +12,7 @@
 
 enum {
     iterations_max = 100,
+    quick_iterations = 20,
     rounds_max = 3,
     delay_starts_max = 64,
     delay_starts_refined = 3,
@@ -129,19 +130,20 @@ static void search_again(const struct parametric_problem *problem, struct attemp
     }
 }
 
-static bool search(const struct parametric_problem *problem, const struct parametric_model *start,
+static bool search(const struct parametric_problem *problem, const struct parametric_model *start, bool quick,
                    struct attempt *out_best)
 {
+    size_t iterations = quick ? quick_iterations : iterations_max;
     out_best->outcome = (struct levenberg_outcome){.cost = INFINITY};
     if (start) {
         parametric_pack(start, out_best->theta);
-        refine(problem, iterations_max, out_best);
+        refine(problem, iterations, out_best);
     } else if (problem->structure.delay_free) {
         search_delays(problem, out_best);
     } else {
-        begin_attempt(problem, problem->structure.delay_s, NULL, iterations_max, out_best);
+        begin_attempt(problem, problem->structure.delay_s, NULL, iterations, out_best);
     }
-    if (!start && isfinite(out_best->outcome.cost)) {
+    if (!start && !quick && isfinite(out_best->outcome.cost)) {
         search_again(problem, out_best);
     }
     return isfinite(out_best->outcome.cost);
@@ -179,11 +181,10 @@ static void hold_reference(const struct parametric_problem *problem, const doubl
     }
 }
 
-/// Factor between (J'J)^-1 of the complex rows' real and imaginary parts and the covariance.
-static double covariance_factor(const struct parametric_data *data, const struct parametric_model *model)
+double parametric_covariance_factor(const struct parametric_data *data, double noise_std)
 {
     if (data->unit_weights) {
-        return 0.5 * model->noise_std * model->noise_std;
+        return 0.5 * noise_std * noise_std;
     }
     double dof = data->variance_dof;
     // Estimated variances: their inverses are dof / (dof - 1) too large on average, and weights that scatter cost
@@ -200,7 +201,7 @@ static int fill_covariance(const struct parametric_problem *problem, double *the
     double *R = malloc(n * n * sizeof *R);
     bool ready = R && tall_qr_init(&rows, n) && scaled_svd_init(&svd, n);
     if (ready) {
-        parametric_problem_information(problem, theta, &rows);
+        parametric_problem_information(problem, theta, NULL, &rows);
         ready = tall_qr_finish(&rows, R) && scaled_svd_factorise(&svd, R, n);
     }
     size_t rank = ready ? scaled_svd_rank(&svd, n - 1, least_share) : 0;
@@ -208,7 +209,7 @@ static int fill_covariance(const struct parametric_problem *problem, double *the
         scaled_svd_inverse_gram(&svd, rank, io_model->covariance);
         hold_reference(problem, theta, io_model->covariance);
         io_model->condition = n > 1 ? svd.singular[0] / svd.singular[n - 2] : 1.0;
-        double factor = covariance_factor(problem->data, io_model);
+        double factor = parametric_covariance_factor(problem->data, io_model->noise_std);
         for (size_t i = 0; i < n * n; i++) {
             io_model->covariance[i] *= factor;
         }
@@ -326,8 +327,9 @@ static struct parametric_model begin_model(const struct parametric_problem *prob
                                      .parameters = problem->layout.unknowns - 1};
 }
 
-int parametric_fit(const struct parametric_data *data, const struct parametric_structure *structure,
-                   const struct parametric_model *start, struct parametric_model *out_model, struct error *out_error)
+static int fit(const struct parametric_data *data, const struct parametric_structure *structure,
+               const struct parametric_model *start, bool quick, struct parametric_model *out_model,
+               struct error *out_error)
 {
     struct parametric_problem problem;
     double scale = start ? start->scale_rad_per_s : 0.0;
@@ -336,7 +338,7 @@ int parametric_fit(const struct parametric_data *data, const struct parametric_s
     struct parametric_model model = {0};
     if (!status) {
         model = begin_model(&problem);
-        if (search(&problem, start, &best)) {
+        if (search(&problem, start, quick, &best)) {
             model.cost = best.outcome.cost;
             model.iterations = best.outcome.iterations;
             model.converged = best.outcome.converged;
@@ -355,6 +357,18 @@ int parametric_fit(const struct parametric_data *data, const struct parametric_s
     }
     *out_model = model;
     return status;
+}
+
+int parametric_fit(const struct parametric_data *data, const struct parametric_structure *structure,
+                   const struct parametric_model *start, struct parametric_model *out_model, struct error *out_error)
+{
+    return fit(data, structure, start, false, out_model, out_error);
+}
+
+int parametric_fit_quickly(const struct parametric_data *data, const struct parametric_structure *structure,
+                           struct parametric_model *out_model, struct error *out_error)
+{
+    return fit(data, structure, NULL, true, out_model, out_error);
 }
 
 int parametric_bound(const struct parametric_data *data, struct parametric_model *io_model, struct error *out_error)
@@ -395,9 +409,9 @@ double parametric_misfit(const struct parametric_model *self)
 double complex parametric_response(const struct parametric_model *self, double frequency_hz, double *out_std)
 {
     double theta[parametric_unknowns_max];
-    struct parametric_line line = {.omega_rad_per_s = 6.283185307179586476925 * frequency_hz};
+    struct parametric_line line;
     parametric_pack(self, theta);
-    line.x = parametric_variable(&self->structure, self->sample_rate_hz, self->scale_rad_per_s, line.omega_rad_per_s);
+    parametric_line_begin(self, frequency_hz, &line);
     parametric_line_response(&self->structure, theta, &line);
     if (out_std) {
         double complex gradient[parametric_unknowns_max];
@@ -420,8 +434,8 @@ double complex parametric_response(const struct parametric_model *self, double f
 static double complex residual_of(const struct parametric_model *self, const double *theta,
                                   const struct parametric_data *data, size_t k, bool transient)
 {
-    struct parametric_line line = {.omega_rad_per_s = 6.283185307179586476925 * data->frequency_hz[k]};
-    line.x = parametric_variable(&self->structure, self->sample_rate_hz, self->scale_rad_per_s, line.omega_rad_per_s);
+    struct parametric_line line;
+    parametric_line_begin(self, data->frequency_hz[k], &line);
     parametric_line_response(&self->structure, theta, &line);
     double complex error = data->output[k] - line.response * parametric_input(data, k);
     if (transient) {

@@ -60,7 +60,9 @@ struct parametric_root {
     double complex s_rad_per_s; ///< of a discrete model: f_s log z
     double frequency_hz, frequency_std_hz;
     double damping, damping_std; ///< -Re s / |s|; 1 and -1 on the real axis
+    double real_std_rad_per_s;   ///< of Re s
     bool pair;
+    bool cancels; ///< a zero may lie on this pole, or a pole on this zero: parametric_mark_cancelling
 };
 
 struct parametric_model {
@@ -74,7 +76,7 @@ struct parametric_model {
     double delay_s, delay_std_s;
     size_t pole_count, zero_count;
     struct parametric_root poles[parametric_order_max], zeros[parametric_order_max];
-    bool stable;        ///< no pole is right of the axis by more than three standard deviations
+    bool stable; ///< no pole is right of the axis (discrete: outside the circle) by more than three standard deviations
     bool dc_gain_known; ///< false with an integrator, or where the denominator at 0 Hz could be 0
     double dc_gain, dc_gain_std;
     size_t lines, parameters;
@@ -104,6 +106,22 @@ int parametric_fit(const struct parametric_data *data, const struct parametric_s
 /// local minimum. The standard deviations of the model are those of noise alone; times the root of this they allow for
 /// what the model misses.
 double parametric_misfit(const struct parametric_model *self);
+
+/// Multiplies covariance and squares of all standard deviations, for what the model misses (parametric_misfit).
+void parametric_inflate(struct parametric_model *io_model, double factor);
+
+/// Marks poles and zeros that lie on each other within their uncertainty: the model may have both for noise alone. They
+/// are less than .3 of their size apart, and by its covariance the difference has a chance above 1 % (chi-square of two
+/// degrees of freedom for pairs, one for real ones). Returns whether there are any.
+bool parametric_mark_cancelling(struct parametric_model *io_model);
+
+/// The same model with the covariance that the noise alone gives it, where the variances that the lines were weighed by
+/// hold something else too: noise_share[k] of line k's is noise.
+/// Equation: C_n = C (sum_k share_k J_k' J_k) C / f, C = f (J'J)^-1
+/// Errors:   as parametric_fit
+int parametric_noise_bound(const struct parametric_data *data, const double *noise_share,
+                           const struct parametric_model *self, struct parametric_model *out_model,
+                           struct error *out_error);
 
 /// Returns G at a frequency and, unless out_std is NULL, its standard deviation sqrt(E|dG|^2).
 double complex parametric_response(const struct parametric_model *self, double frequency_hz, double *out_std);

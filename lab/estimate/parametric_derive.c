@@ -46,14 +46,17 @@ static struct parametric_root describe(const struct parametric_model *model, con
         .s_rad_per_s = s, .frequency_hz = size / two_pi, .damping = -creal(s) / size, .pair = cimag(x) != 0.0};
     double frequency[parametric_terms_max];
     double damping[parametric_terms_max];
+    double real[parametric_terms_max];
     double complex step = -slope / polynomial_slope(coefficients, count - 1, x);
     for (size_t i = 0; i < count; i++, step *= x) {
         double along = (creal(s) * creal(step) + cimag(s) * cimag(step)) / size; // change of |s|
         frequency[i] = along / two_pi;
         damping[i] = (-creal(step) + creal(s) / size * along) / size;
+        real[i] = creal(step);
     }
     root.frequency_std_hz = sqrt(quadratic(model, first, count, frequency));
     root.damping_std = sqrt(quadratic(model, first, count, damping));
+    root.real_std_rad_per_s = sqrt(quadratic(model, first, count, real));
     return root;
 }
 
@@ -125,11 +128,18 @@ static void fill_dc_gain(struct parametric_model *io_model, const struct paramet
     }
 }
 
-/// An integrator is as likely found just right of the axis as left of it.
-static bool surely_unstable(const struct parametric_root *pole)
+/// An integrator is as likely found just right of the axis as left of it. Of a discrete pole 1/z is judged, for which
+/// far outside the circle, where the logarithm bends, is near 0.
+static bool surely_unstable(const struct parametric_model *model, const struct parametric_root *pole)
 {
-    double std = pole->pair ? pole->damping_std : pole->frequency_std_hz / pole->frequency_hz;
-    return pole->damping < -surely_not_zero * std;
+    double real = creal(pole->s_rad_per_s);
+    double std = pole->real_std_rad_per_s;
+    if (model->structure.domain == parametric_discrete) {
+        double size = exp(-real / model->sample_rate_hz);
+        std *= size / model->sample_rate_hz;
+        return 1.0 - size > surely_not_zero * std;
+    }
+    return real > surely_not_zero * std;
 }
 
 int parametric_derive(struct parametric_model *io_model, struct error *out_error)
@@ -148,7 +158,7 @@ int parametric_derive(struct parametric_model *io_model, struct error *out_error
     fill_dc_gain(io_model, &layout);
     io_model->stable = true;
     for (size_t i = 0; i < io_model->pole_count; i++) {
-        io_model->stable = io_model->stable && !surely_unstable(&io_model->poles[i]);
+        io_model->stable = io_model->stable && !surely_unstable(io_model, &io_model->poles[i]);
     }
     return 0;
 }

@@ -4,7 +4,7 @@
 #define SERVOSCOPE_ESTIMATE_PARAMETRIC_FRF_H
 
 #include "lab/estimate/options.h"
-#include "lab/estimate/parametric_orders.h"
+#include "lab/estimate/parametric_identify.h"
 #include "lab/estimate/periodic.h"
 #include "lab/record/frf_file.h"
 
@@ -13,7 +13,7 @@
 /// Data for parametric_fit with the memory behind them.
 struct parametric_spectra {
     struct parametric_data data;
-    double *frequency_hz, *output_variance, *input_variance;
+    double *frequency_hz, *output_variance, *input_variance, *noise_share;
     double complex *input, *output, *output_covariance;
 };
 
@@ -23,19 +23,22 @@ struct parametric_spectra {
 int parametric_spectra_from_periodic(const struct periodic *recording, size_t first, size_t count,
                                      struct parametric_spectra *out_self, struct error *out_error);
 
-/// Valid lines of a response with their total standard deviations. Without standard deviations, and so without
-/// unit_weights, parametric_fit refuses. sample_rate_hz is for discrete models, 0 if there is none.
+/// Valid lines of a response with their total standard deviations, of which noise_std is the noise's share. Without
+/// standard deviations, and so without unit_weights, parametric_fit refuses. sample_rate_hz is for discrete models, 0
+/// if there is none.
 int parametric_spectra_from_frf(const struct frf *frf, const char *name, double sample_rate_hz, bool unit_weights,
                                 struct parametric_spectra *out_self, struct error *out_error);
 
+/// The arrays of `self` that parametric_identify may change.
+struct parametric_weights parametric_spectra_weights(struct parametric_spectra *self);
+
 void parametric_spectra_free(struct parametric_spectra *self);
 
-/// Puts the model's response into every line of a response, all of them valid, with noise_std from the bound and std
-/// that times the root of the misfit, and keys that say what the model is: parametric_order, parametric_poles,
-/// parametric_cost and others.
+/// Puts the model's response into every line of a response, all of them valid, with std and noise_std, the factor of
+/// their 95 % regions (confidence_95_factor, parametric_region.h), and keys that say what the model is:
+/// parametric_order, parametric_poles, parametric_cost and others (docs/files.md).
 /// Errors: false if memory is short
-bool parametric_fill_frf(const struct parametric_model *model, const struct parametric_orders *orders,
-                         struct frf *io_frf);
+bool parametric_fill_frf(const struct parametric_outcome *outcome, struct frf *io_frf);
 
 /// Model as a JSON object: domain, coefficients with standard deviations (discrete: of z^0, z^-1, ...; continuous: of
 /// s^0, s^1, ... with time in seconds), delay, poles and zeros as frequency and damping, gain, cost and its expected
@@ -43,10 +46,20 @@ bool parametric_fill_frf(const struct parametric_model *model, const struct para
 /// Errors: NULL if memory is short; the caller frees it with cJSON_Delete
 cJSON *parametric_json(const struct parametric_model *model, const struct parametric_orders *orders);
 
-/// Method `parametric` of lab/estimate/method.h: a discrete model (the input is held between samples) of the orders
-/// that parametric_orders_choose picks, evaluated at the recording's lines.
+/// The same with what identification adds: misfit, lines pooled, the drive in s (`continuous`), hint.
+/// `with_orders`: the table of orders too
+cJSON *parametric_outcome_json(const struct parametric_outcome *outcome, bool with_orders);
+
+/// Method `parametric` of lab/estimate/method.h: a model whose orders and delay come from the data, evaluated at the
+/// recording's lines; discrete (the input is held between samples) unless options->continuous.
 /// Test: tests/unit/test_parametric_frf.c
 int frf_parametric_estimate(const struct periodic *recording, const struct estimate_options *options,
                             struct frf *out_frf, struct error *out_error);
+
+/// The same of a response that is there already, from its standard deviations: that of a sequence, whose segments have
+/// lines of their own, or the mean of several realisations. Keys of `measured` are kept. `name` is for messages.
+/// Errors: as parametric_identify; too few degrees of freedom behind the standard deviations. *out_frf is empty then
+int frf_parametric_fit(const struct frf *measured, const char *name, const struct estimate_options *options,
+                       struct frf *out_frf, struct error *out_error);
 
 #endif

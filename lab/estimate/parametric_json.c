@@ -45,7 +45,8 @@ static bool add_roots(cJSON *object, const char *name, const struct parametric_r
             !add_number(root, "damping", roots[i].damping) || !add_number(root, "damping_std", roots[i].damping_std) ||
             !add_number(root, "real_rad_per_s", creal(roots[i].s_rad_per_s)) ||
             !add_number(root, "imag_rad_per_s", cimag(roots[i].s_rad_per_s)) ||
-            !cJSON_AddBoolToObject(root, "pair", roots[i].pair)) {
+            !cJSON_AddBoolToObject(root, "pair", roots[i].pair) ||
+            !cJSON_AddBoolToObject(root, "cancels", roots[i].cancels)) {
             return false;
         }
     }
@@ -63,7 +64,9 @@ static bool add_row(cJSON *array, const struct parametric_order_row *row)
            add_number(object, "denominator_order", (double)row->denominator_order) &&
            add_number(object, "parameters", (double)row->parameters) && add_number(object, "cost", row->cost) &&
            add_number(object, "cost_expected", row->cost_expected) && add_number(object, "mdl", row->mdl) &&
-           add_number(object, "held_out_error", row->held_out) && cJSON_AddBoolToObject(object, "stable", row->stable);
+           (!row->judged || add_number(object, "held_out_error", row->held_out)) &&
+           cJSON_AddBoolToObject(object, "stable", row->stable) &&
+           cJSON_AddBoolToObject(object, "doubtful", row->doubtful);
 }
 
 static bool add_orders(cJSON *object, const struct parametric_orders *orders)
@@ -124,6 +127,35 @@ cJSON *parametric_json(const struct parametric_model *model, const struct parame
 {
     cJSON *object = cJSON_CreateObject();
     if (object && (!fill(object, model) || (orders && !add_orders(object, orders)))) {
+        cJSON_Delete(object);
+        object = NULL;
+    }
+    return object;
+}
+
+static bool fill_outcome(cJSON *object, const struct parametric_outcome *outcome)
+{
+    bool good = add_number(object, "pooled_lines", (double)outcome->pooled_lines);
+    if (good && outcome->noise_cost_expected > 0.0) {
+        good = add_number(object, "noise_cost", outcome->noise_cost) &&
+               add_number(object, "noise_cost_expected", outcome->noise_cost_expected) &&
+               add_number(object, "noise_cost_std", outcome->noise_cost_std) &&
+               add_number(object, "noise_misfit", outcome->misfit);
+    }
+    if (good && outcome->hint[0]) {
+        good = cJSON_AddStringToObject(object, "hint", outcome->hint);
+    }
+    if (good && outcome->has_plant) {
+        cJSON *plant = cJSON_AddObjectToObject(object, "continuous");
+        good = plant && fill(plant, &outcome->plant);
+    }
+    return good;
+}
+
+cJSON *parametric_outcome_json(const struct parametric_outcome *outcome, bool with_orders)
+{
+    cJSON *object = parametric_json(&outcome->model, with_orders ? &outcome->orders : NULL);
+    if (object && !fill_outcome(object, outcome)) {
         cJSON_Delete(object);
         object = NULL;
     }

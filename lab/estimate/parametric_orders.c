@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/parametric_orders.h"
 
+#include "lab/estimate/parametric_problem.h"
+#include "lab/numeric/statistics.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,7 +11,19 @@
 enum { folds = 4, default_max = 6 };
 
 static const double as_good = 1.0; ///< standard errors
-static const double surely_worse = 2.0;
+
+/// A larger model is believed if noise alone gains as much with less than this chance. Some ten larger models are
+/// tried, alike enough that together they deceive in about one choice of two hundred.
+static const double chance_of_belief = 1e-3;
+
+/// Rows whose description is so many nats longer than the shortest cannot be chosen.
+static const double hopeless = 40.0;
+
+/// A pole above the lines is determined if its frequency is as many standard deviations.
+static const double surely_there = 2.0;
+
+/// A residual below this share of the outputs is rounding.
+static const double rounding_share = 1e-12;
 
 /// Lines of the data whose number modulo `folds` is `fold`, or all others.
 struct subset {
@@ -21,9 +36,12 @@ struct study {
     const struct parametric_data *data;
     const struct parametric_orders_options *options;
     struct subset fitted[folds], left[folds];
-    double *power;            ///< rows x judged lines: |residual|^2 of held-out lines
-    double complex *residual; ///< judged lines
-    size_t judged;            ///< held-out lines
+    struct parametric_model *models; ///< of each row
+    double *power;                   ///< rows x judged lines: |residual|^2 of held-out lines
+    double complex *residual;        ///< judged lines
+    size_t judged;                   ///< held-out lines
+    double rounding;                 ///< a cost that is none
+    double highest_hz;               ///< line
 };
 
 static void subset_free(struct subset *self)
@@ -98,6 +116,20 @@ static void store_power(const struct parametric_data *data, bool transient, cons
     }
 }
 
+/// Fits a part of the lines. The whole model knows of lines that the part does not have, and a resonance that one line
+/// suggested stays where nothing speaks against it: a start of the part's own competes with it.
+static bool fit_part(const struct parametric_data *data, const struct parametric_model *whole,
+                     struct parametric_model *out_part)
+{
+    struct parametric_model own;
+    bool found = parametric_fit(data, &whole->structure, whole, out_part, NULL) == 0;
+    if (parametric_fit_quickly(data, &whole->structure, &own, NULL) == 0 && (!found || own.cost < out_part->cost)) {
+        *out_part = own;
+        found = true;
+    }
+    return found;
+}
+
 /// Residual powers of data that the fit has not seen. Returns false if a part of the lines does not determine the
 /// model.
 static bool judge(struct study *study, const struct parametric_model *model, double *out_power)
@@ -108,7 +140,7 @@ static bool judge(struct study *study, const struct parametric_model *model, dou
     }
     for (size_t fold = 0; fold < folds; fold++) {
         struct parametric_model part;
-        if (parametric_fit(&study->fitted[fold].data, &model->structure, model, &part, NULL) != 0) {
+        if (!fit_part(&study->fitted[fold].data, model, &part)) {
             return false;
         }
         store_power(&study->left[fold].data, true, &part, study->residual, out_power);
@@ -141,7 +173,7 @@ static double excess(const struct study *study, size_t a, size_t b)
     return scatter > 0.0 ? difference / sqrt(scatter) : difference > 0.0 ? INFINITY : 0.0;
 }
 
-static double description_length(size_t lines, size_t parameters, double cost)
+double parametric_description_length(size_t lines, size_t parameters, double cost)
 {
     double count = (double)lines;
     double spare = 2.0 * count - (double)parameters - 2.0;
@@ -149,23 +181,38 @@ static double description_length(size_t lines, size_t parameters, double cost)
     return spare > 0.0 ? length : INFINITY;
 }
 
-static int fit_row(struct study *study, struct parametric_order_row *io_row, double *out_power, struct error *out_error)
+/// Whether a model has poles that its residual does not speak for.
+static bool is_doubtful(const struct parametric_model *model, double highest_hz)
+{
+    struct parametric_model copy = *model;
+    parametric_inflate(&copy, parametric_misfit(model));
+    bool doubtful = parametric_mark_cancelling(&copy);
+    for (size_t i = 0; i < copy.pole_count; i++) {
+        const struct parametric_root *pole = &copy.poles[i];
+        bool vague = !(pole->frequency_hz > surely_there * pole->frequency_std_hz);
+        doubtful = doubtful || (vague && pole->frequency_hz > highest_hz);
+    }
+    return doubtful;
+}
+
+static int fit_row(const struct study *study, bool quick, struct parametric_order_row *io_row,
+                   struct parametric_model *out_model, struct error *out_error)
 {
     struct parametric_structure structure = study->options->structure;
-    struct parametric_model model;
     structure.numerator_order = io_row->numerator_order;
     structure.denominator_order = io_row->denominator_order;
-    int status = parametric_fit(study->data, &structure, NULL, &model, out_error);
+    int status = quick ? parametric_fit_quickly(study->data, &structure, out_model, out_error)
+                       : parametric_fit(study->data, &structure, NULL, out_model, out_error);
     if (status) {
         return status;
     }
-    io_row->fitted = judge(study, &model, out_power);
-    io_row->parameters = model.parameters;
-    io_row->stable = model.stable;
-    io_row->cost = model.cost;
-    io_row->cost_expected = model.cost_expected;
-    io_row->mdl = description_length(model.lines, model.parameters, model.cost);
-    io_row->held_out = io_row->fitted ? mean(out_power, study->judged) : 0.0;
+    io_row->fitted = true;
+    io_row->parameters = out_model->parameters;
+    io_row->stable = out_model->stable;
+    io_row->doubtful = is_doubtful(out_model, study->highest_hz);
+    io_row->cost = out_model->cost;
+    io_row->cost_expected = out_model->cost_expected;
+    io_row->mdl = parametric_description_length(out_model->lines, out_model->parameters, out_model->cost);
     return 0;
 }
 
@@ -175,32 +222,101 @@ static size_t best_held_out(const struct parametric_orders *orders)
     size_t best = orders->count;
     for (size_t i = 0; i < orders->count; i++) {
         const struct parametric_order_row *row = &orders->rows[i];
-        if (row->fitted && (best == orders->count || row->held_out < orders->rows[best].held_out)) {
+        if (row->judged && (best == orders->count || row->held_out < orders->rows[best].held_out)) {
             best = i;
         }
     }
     return best;
 }
 
-/// Whether a row could take the place of another as the choice by description length.
-static bool shorter(const struct parametric_orders *orders, size_t row, size_t other)
+/// Chance that noise alone lowers the cost as much as it falls from row `small` to row `large`.
+/// Equation: F = (V_s - V_l) / dp / (V_l / (2 lines - p_l)) ~ F(dp, 2 lines - p_l), the noise's size taken from the
+///           residual, so that variances that are too small for what no order explains do no harm. A pole that is not
+///           there can be anywhere with its zero: each resonance is looked for in as many places as there are lines, so
+///           that the chance is lines^(poles / 2) times that of one place.
+static double chance_of_gain(const struct study *study, const struct parametric_order_row *small,
+                             const struct parametric_order_row *large)
 {
-    return orders->rows[row].fitted && orders->rows[row].mdl < orders->rows[other].mdl;
+    double added = (double)(large->parameters - small->parameters);
+    double poles = (double)(large->denominator_order - small->denominator_order);
+    double lines = (double)study->data->count;
+    double left = 2.0 * lines - (double)large->parameters;
+    double ratio = (small->cost - large->cost) / added / (large->cost / left);
+    return left > 0.0 && ratio > 0.0 ? fmin(1.0, statistics_f_tail(ratio, added, left) * pow(lines, 0.5 * poles)) : 1.0;
 }
 
-/// A stable row that predicts as well as any, `chosen` if there is none: noise makes unstable poles where a model has
-/// more of them than the plant.
-static size_t stable_instead(const struct study *study, const struct parametric_orders *orders, size_t best,
-                             size_t chosen)
+static bool contains(const struct parametric_order_row *large, const struct parametric_order_row *small)
+{
+    return large->parameters > small->parameters && large->denominator_order >= small->denominator_order &&
+           large->numerator_order >= small->numerator_order;
+}
+
+/// Whether no larger row explains surely more, by its own lines and by those held out.
+static bool adequate(const struct study *study, const struct parametric_orders *orders, size_t row)
+{
+    const struct parametric_order_row *small = &orders->rows[row];
+    if (!small->judged) {
+        return false;
+    }
+    for (size_t i = 0; i < orders->count && small->cost > study->rounding; i++) {
+        const struct parametric_order_row *large = &orders->rows[i];
+        if (large->judged && !large->doubtful && contains(large, small) &&
+            chance_of_gain(study, small, large) < chance_of_belief && excess(study, row, i) > as_good) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/// Fewer poles, then fewer parameters, then the smaller cost. Poles first: many of them can stand for zeros.
+static bool simpler(const struct parametric_order_row *row, const struct parametric_order_row *other)
+{
+    if (row->denominator_order != other->denominator_order) {
+        return row->denominator_order < other->denominator_order;
+    }
+    return row->parameters < other->parameters || (row->parameters == other->parameters && row->cost < other->cost);
+}
+
+/// The simplest adequate row that is stable and not doubtful, of any kind if `any`; `count` if there is
+/// none.
+static size_t simplest(const struct study *study, const struct parametric_orders *orders, bool any)
 {
     size_t found = orders->count;
     for (size_t i = 0; i < orders->count; i++) {
-        bool able = orders->rows[i].fitted && orders->rows[i].stable && excess(study, i, best) <= surely_worse;
-        if (able && (found == orders->count || shorter(orders, i, found))) {
+        const struct parametric_order_row *row = &orders->rows[i];
+        if ((any || (row->stable && !row->doubtful)) && adequate(study, orders, i) &&
+            (found == orders->count || simpler(row, &orders->rows[found]))) {
             found = i;
         }
     }
-    return found < orders->count ? found : chosen;
+    return found;
+}
+
+/// Of rows with as many poles, as stable and as little doubtful, the one with the numerator to keep. A coefficient that
+/// is left out although it is there moves the response by more than the model's deviations say, and so does one that was
+/// taken because it looked large; one that was asked for anyway does not. Held input needs as many as there are poles,
+/// and one for a part of a sample. In s, where most of them would be zeros far away, Akaike's criterion chooses.
+static size_t best_numerator(const struct study *study, const struct parametric_orders *orders, size_t row)
+{
+    const double nats = 2.0; // for a parameter, instead of the logarithm of the number of lines
+    const struct parametric_order_row *chosen = &orders->rows[row];
+    bool discrete = study->options->structure.domain == parametric_discrete;
+    double lines = (double)study->data->count;
+    double least = INFINITY;
+    size_t best = row;
+    for (size_t i = 0; i < orders->count && chosen->cost > study->rounding; i++) {
+        const struct parametric_order_row *other = &orders->rows[i];
+        double spare = 2.0 * lines - (double)other->parameters - 2.0;
+        bool able = other->judged && other->denominator_order == chosen->denominator_order && spare > 0.0 &&
+                    other->stable >= chosen->stable && other->doubtful <= chosen->doubtful;
+        double length = lines * log(other->cost / lines) + lines * nats * (double)other->parameters / spare;
+        length = discrete ? -(double)other->numerator_order : length;
+        if (able && length < least) {
+            least = length;
+            best = i;
+        }
+    }
+    return best;
 }
 
 static void explain(const struct study *study, size_t best, const char *reason, struct parametric_orders *io_orders)
@@ -223,27 +339,32 @@ static void choose(const struct study *study, struct parametric_orders *io_order
     io_orders->by_mdl = best;
     io_orders->by_held_out = best;
     for (size_t i = 0; i < io_orders->count; i++) {
-        if (shorter(io_orders, i, io_orders->by_mdl)) {
+        const struct parametric_order_row *row = &io_orders->rows[i];
+        if (row->judged && row->mdl < io_orders->rows[io_orders->by_mdl].mdl) {
             io_orders->by_mdl = i;
         }
-        if (io_orders->rows[i].fitted &&
-            io_orders->rows[i].parameters < io_orders->rows[io_orders->by_held_out].parameters &&
+        if (row->judged && row->parameters < io_orders->rows[io_orders->by_held_out].parameters &&
             excess(study, i, best) <= as_good) {
             io_orders->by_held_out = i;
         }
     }
-    const char *reason = "least description length";
-    io_orders->chosen = io_orders->by_mdl;
-    if (excess(study, io_orders->by_mdl, best) > surely_worse) {
-        reason = "fewest parameters that predict held-out data as well as any";
-        io_orders->chosen = io_orders->by_held_out;
+    const char *reason = "fewest poles of the stable ones that no larger model surely betters";
+    io_orders->chosen = simplest(study, io_orders, false);
+    if (io_orders->chosen == io_orders->count) {
+        reason = "fewest poles of those that no larger model surely betters, none of them stable or without a pole on "
+                 "a zero";
+        io_orders->chosen = simplest(study, io_orders, true);
     }
-    if (!io_orders->rows[io_orders->chosen].stable) {
-        size_t stable = stable_instead(study, io_orders, best, io_orders->chosen);
-        reason = stable != io_orders->chosen ? "stable, and predicts held-out data as well as any" : reason;
-        io_orders->chosen = stable;
-    }
+    io_orders->chosen = best_numerator(study, io_orders, io_orders->chosen);
     explain(study, best, reason, io_orders);
+}
+
+/// What rounding alone adds to the cost; nothing is known without variances, which the fit refuses.
+static double rounding_of(const struct parametric_data *data, size_t k)
+{
+    double share = rounding_share * cabs(data->output[k]);
+    bool known = data->unit_weights || data->output_variance;
+    return known ? share * share / parametric_error_variance(data, k, 0.0) : 0.0;
 }
 
 static bool study_init(struct study *self, size_t rows)
@@ -253,11 +374,16 @@ static bool study_init(struct study *self, size_t rows)
     self->judged = held_out ? held_out->count : self->data->count;
     self->power = malloc(rows * self->judged * sizeof *self->power);
     self->residual = malloc(self->judged * sizeof *self->residual);
+    self->models = malloc(rows * sizeof *self->models);
     for (size_t fold = 0; fold < folds && !held_out; fold++) {
         good = subset_init(self->data, fold, false, &self->fitted[fold]) && good;
         good = subset_init(self->data, fold, true, &self->left[fold]) && good;
     }
-    return good && self->power && self->residual;
+    for (size_t k = 0; k < self->data->count; k++) {
+        self->highest_hz = fmax(self->highest_hz, self->data->frequency_hz[k]);
+        self->rounding += rounding_of(self->data, k);
+    }
+    return good && self->power && self->residual && self->models;
 }
 
 static void study_free(struct study *self)
@@ -268,6 +394,7 @@ static void study_free(struct study *self)
     }
     free(self->power);
     free(self->residual);
+    free(self->models);
 }
 
 static void list_rows(const struct parametric_orders_options *options, struct parametric_orders *out_orders)
@@ -283,25 +410,69 @@ static void list_rows(const struct parametric_orders_options *options, struct pa
     }
 }
 
-/// Fits all rows; the first refusal is told if none works.
+/// Description length of the best row that may be chosen; of any if none may.
+static double shortest(const struct parametric_orders *orders)
+{
+    double able = INFINITY;
+    double any = INFINITY;
+    for (size_t i = 0; i < orders->count; i++) {
+        const struct parametric_order_row *row = &orders->rows[i];
+        any = row->fitted ? fmin(any, row->mdl) : any;
+        able = row->fitted && row->stable && !row->doubtful ? fmin(able, row->mdl) : able;
+    }
+    return isfinite(able) ? able : any;
+}
+
+/// Whether a row fits worse than one that it contains: it stopped in the wrong place.
+static bool astray(const struct parametric_orders *orders, size_t row)
+{
+    for (size_t i = 0; i < orders->count; i++) {
+        const struct parametric_order_row *small = &orders->rows[i];
+        if (small->fitted && contains(&orders->rows[row], small) && small->cost < orders->rows[row].cost) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// Fits all rows quickly, then those that may be chosen, or have lost their way, with all means. The first refusal is
+/// told if none works.
 static int fit_rows(struct study *study, struct parametric_orders *io_orders, struct error *out_error)
 {
-    int status = 0;
     bool any = false;
     struct error first = {0};
     for (size_t i = 0; i < io_orders->count; i++) {
         struct error refusal;
-        if (fit_row(study, &io_orders->rows[i], study->power + i * study->judged, &refusal) != 0 && !first.status) {
+        if (fit_row(study, true, &io_orders->rows[i], &study->models[i], &refusal) != 0 && !first.status) {
             first = refusal;
         }
         any = any || io_orders->rows[i].fitted;
     }
-    if (!any) {
-        status = error_set(out_error, error_refused, "%s",
-                           first.status ? first.message
-                                        : "no pair of orders could be fitted to three quarters of the lines");
+    double limit = shortest(io_orders) + hopeless;
+    for (size_t i = 0; i < io_orders->count; i++) {
+        struct parametric_order_row *row = &io_orders->rows[i];
+        if (row->fitted && (!(row->mdl > limit) || astray(io_orders, i))) {
+            row->fitted = fit_row(study, false, row, &study->models[i], NULL) == 0;
+        }
     }
-    return status;
+    return any ? 0 : error_set(out_error, error_refused, "%s", first.message);
+}
+
+/// Judges the rows that could be chosen by data that were not fitted. Returns false if there is none.
+static bool judge_rows(struct study *study, struct parametric_orders *io_orders)
+{
+    double limit = shortest(io_orders) + hopeless;
+    bool any = false;
+    for (size_t i = 0; i < io_orders->count; i++) {
+        struct parametric_order_row *row = &io_orders->rows[i];
+        double *power = study->power + i * study->judged;
+        if (row->fitted && !(row->mdl > limit)) {
+            row->judged = judge(study, &study->models[i], power);
+            row->held_out = row->judged ? mean(power, study->judged) : 0.0;
+            any = any || row->judged;
+        }
+    }
+    return any;
 }
 
 int parametric_orders_choose(const struct parametric_data *data, const struct parametric_orders_options *options,
@@ -321,14 +492,14 @@ int parametric_orders_choose(const struct parametric_data *data, const struct pa
                      ? fit_rows(&study, &orders, out_error)
                      : error_set(out_error, error_refused, "%s: not enough memory for %zu orders of %zu lines",
                                  data->name, orders.count, data->count);
-    if (!status) {
-        choose(&study, &orders);
-        struct parametric_structure structure = options->structure;
-        structure.numerator_order = orders.rows[orders.chosen].numerator_order;
-        structure.denominator_order = orders.rows[orders.chosen].denominator_order;
-        status = parametric_fit(data, &structure, NULL, out_model, out_error);
+    if (!status && !judge_rows(&study, &orders)) {
+        status = error_set(out_error, error_refused,
+                           "%s: no pair of orders could be fitted to three quarters of %zu lines: expected more lines",
+                           data->name, data->count);
     }
     if (!status) {
+        choose(&study, &orders);
+        *out_model = study.models[orders.chosen];
         *out_orders = orders;
     }
     study_free(&study);

@@ -79,6 +79,20 @@ static double complex polynomial_from(const double *coefficients, size_t count, 
     return count > 0 ? power(x, lowest) * polynomial_value(coefficients, count - 1, x) : 0.0;
 }
 
+static double complex delay_factor(double omega_rad_per_s, double delay_s)
+{
+    return delay_s == 0.0 ? 1.0 : cexp(-I * (omega_rad_per_s * delay_s));
+}
+
+void parametric_line_begin(const struct parametric_model *model, double frequency_hz, struct parametric_line *out_line)
+{
+    double omega = two_pi * frequency_hz;
+    *out_line = (struct parametric_line){
+        .x = parametric_variable(&model->structure, model->sample_rate_hz, model->scale_rad_per_s, omega),
+        .omega_rad_per_s = omega,
+        .delay = delay_factor(omega, model->structure.delay_s)};
+}
+
 void parametric_line_response(const struct parametric_structure *structure, const double *theta,
                               struct parametric_line *io_line)
 {
@@ -86,8 +100,9 @@ void parametric_line_response(const struct parametric_structure *structure, cons
     const double *b = theta + layout.denominators;
     const double *i = b + layout.numerators;
     double complex x = io_line->x;
-    double delay_s = structure->delay_free ? i[layout.transients] : structure->delay_s;
-    io_line->delay = delay_s == 0.0 ? 1.0 : cexp(-I * (io_line->omega_rad_per_s * delay_s));
+    if (structure->delay_free) {
+        io_line->delay = delay_factor(io_line->omega_rad_per_s, i[layout.transients]);
+    }
     double complex denominator = polynomial_from(theta, layout.denominators, structure->denominator_lowest, x);
     io_line->inverse = conj(denominator) / square(denominator);
     io_line->response =
@@ -160,6 +175,7 @@ void parametric_problem_line(const struct parametric_problem *self, const double
 {
     out_line->x = self->x[k];
     out_line->omega_rad_per_s = self->omega_rad_per_s[k];
+    out_line->delay = self->delay[k];
     parametric_line_response(&self->structure, theta, out_line);
     out_line->error =
         self->data->output[k] - out_line->response * parametric_input(self->data, k) - out_line->transient;
@@ -215,7 +231,8 @@ double parametric_problem_evaluate(const void *problem, const double *theta, str
     return cost;
 }
 
-void parametric_problem_information(const struct parametric_problem *self, const double *theta, struct tall_qr *io_rows)
+void parametric_problem_information(const struct parametric_problem *self, const double *theta, const double *share,
+                                    struct tall_qr *io_rows)
 {
     for (size_t k = 0; k < self->data->count; k++) {
         struct parametric_line line;
@@ -228,9 +245,10 @@ void parametric_problem_information(const struct parametric_problem *self, const
             conj(parametric_covariance(self->data, k)) - conj(line.response) * parametric_input_variance(self->data, k);
         double complex input = parametric_input(self->data, k) - shared * line.error / line.variance;
         parametric_line_gradient(&self->structure, &line, response, input, output);
+        double weight = sqrt((share ? share[k] : 1.0) / line.variance);
         for (size_t i = 0; i < self->layout.unknowns; i++) {
-            rows.real[i] = creal(output[i]) / sqrt(line.variance);
-            rows.imag[i] = cimag(output[i]) / sqrt(line.variance);
+            rows.real[i] = creal(output[i]) * weight;
+            rows.imag[i] = cimag(output[i]) * weight;
         }
         add_rows(&rows, io_rows);
     }
@@ -336,9 +354,11 @@ static int check(const struct parametric_data *data, const struct parametric_str
                          data->name, data->count);
     }
     if (!data->unit_weights && data->variance_dof != 0.0 && !(data->variance_dof > 2.0)) {
-        return error_set(out_error, error_refused,
-                         "%s: variances from %g complex degrees of freedom: expected more than 2 (4 periods or more)",
-                         data->name, data->variance_dof);
+        return error_set(
+            out_error, error_refused,
+            "%s: variances from %g complex degrees of freedom: expected more than 2 (4 periods or realisations, or "
+            "lines that scatter like their neighbours)",
+            data->name, data->variance_dof);
     }
     for (size_t k = 0; k < data->count && !status; k++) {
         status = check_line(data, structure, k, out_error);
@@ -370,13 +390,15 @@ int parametric_problem_init(const struct parametric_data *data, const struct par
     out_self->scale_rad_per_s = scale_rad_per_s > 0.0 ? scale_rad_per_s : middle_rad_per_s(data);
     out_self->x = malloc(data->count * sizeof *out_self->x);
     out_self->omega_rad_per_s = malloc(data->count * sizeof *out_self->omega_rad_per_s);
-    if (!out_self->x || !out_self->omega_rad_per_s) {
+    out_self->delay = malloc(data->count * sizeof *out_self->delay);
+    if (!out_self->x || !out_self->omega_rad_per_s || !out_self->delay) {
         parametric_problem_free(out_self);
         return error_set(out_error, error_refused, "%s: not enough memory for %zu lines", data->name, data->count);
     }
     for (size_t k = 0; k < data->count; k++) {
         double omega = two_pi * data->frequency_hz[k];
         out_self->omega_rad_per_s[k] = omega;
+        out_self->delay[k] = delay_factor(omega, structure->delay_s);
         out_self->x[k] = parametric_variable(structure, data->sample_rate_hz, out_self->scale_rad_per_s, omega);
     }
     return 0;
@@ -386,6 +408,8 @@ void parametric_problem_free(struct parametric_problem *self)
 {
     free(self->x);
     free(self->omega_rad_per_s);
+    free(self->delay);
     self->x = NULL;
+    self->delay = NULL;
     self->omega_rad_per_s = NULL;
 }

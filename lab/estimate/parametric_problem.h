@@ -20,6 +20,7 @@ struct parametric_problem {
     double scale_rad_per_s;
     double complex *x;       ///< per line
     double *omega_rad_per_s; ///< per line
+    double complex *delay;   ///< per line: exp(-j w delay) of a fixed delay
 };
 
 /// One line at one theta.
@@ -49,7 +50,10 @@ void parametric_problem_free(struct parametric_problem *self);
 double complex parametric_variable(const struct parametric_structure *structure, double sample_rate_hz,
                                    double scale_rad_per_s, double omega_rad_per_s);
 
-/// Fills in G and what it is made of; x and omega_rad_per_s are given.
+/// A line of a model: x, omega_rad_per_s and, for a fixed delay, its factor.
+void parametric_line_begin(const struct parametric_model *model, double frequency_hz, struct parametric_line *out_line);
+
+/// Fills in G and what it is made of; x, omega_rad_per_s and the factor of a fixed delay are given.
 void parametric_line_response(const struct parametric_structure *structure, const double *theta,
                               struct parametric_line *io_line);
 
@@ -63,8 +67,9 @@ void parametric_problem_line(const struct parametric_problem *self, const double
 /// For levenberg_minimise: cost, and rows of the Jacobian with the residual.
 double parametric_problem_evaluate(const void *problem, const double *theta, struct tall_qr *io_rows);
 
-/// Adds the rows of Fisher's information: the derivative of G U + T alone, at the most likely input.
-void parametric_problem_information(const struct parametric_problem *self, const double *theta,
+/// Adds the rows of Fisher's information: the derivative of G U + T alone, at the most likely input. `share` (NULL: 1)
+/// weighs the lines.
+void parametric_problem_information(const struct parametric_problem *self, const double *theta, const double *share,
                                     struct tall_qr *io_rows);
 
 /// Of the data's line k, 0 and 1 where there is none.
@@ -77,10 +82,19 @@ double parametric_error_variance(const struct parametric_data *data, size_t k, d
 /// A cost that noise alone explains: four standard deviations above the number of lines; 0 if the noise is not known.
 double parametric_plausible_cost(const struct parametric_data *data);
 
+/// parametric_fit with 20 steps from one start: enough to compare structures, most of which are wrong; a wrong one
+/// takes the full fit longest.
+int parametric_fit_quickly(const struct parametric_data *data, const struct parametric_structure *structure,
+                           struct parametric_model *out_model, struct error *out_error);
+
 /// Finds where to start for one delay by iterated linear least squares, the first weights those of the theta
 /// `weigh_by`, or with NULL those of the measured response. Returns the cost there, not finite if there is none.
 double parametric_start_find(const struct parametric_problem *self, double delay_s, const double *weigh_by,
                              double *out_theta);
+
+/// Factor between (J'J)^-1 of the rows and the covariance: real and imaginary parts apart, and what estimated variances
+/// cost.
+double parametric_covariance_factor(const struct parametric_data *data, double noise_std);
 
 /// Fills in standard deviations, poles, zeros and gain of a model that has its coefficients and covariance.
 /// Errors: error_refused if memory is short or roots are not found

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/period_search.h"
 
-#include "lab/estimate/circle.h"
 #include "lab/numeric/fft.h"
 
 #include <math.h>
@@ -16,10 +15,11 @@ static const double share_of_missing = 0.1;
 /// Samples by which the last period may have moved against the first before the estimate says so.
 static const double tolerated_drift_samples = 0.25;
 static const double rounding_power = 1e-24;
-static const double smallest_line = 0.01;
-/// Excited lines stand this far above those that a loop or a nonlinearity makes of them.
-static const double clear_gap = 3.0;
-static const double chance_of_false_line = 1e-6;
+/// A period that somebody said may be this far from a multiple of the one found: a clock of its own moves it so much.
+static const double tolerated_distance_samples = 0.5;
+/// It is refuted if it misses this many times as much of a perfect correlation as the one found, and a little more.
+static const double clearly_worse = 2.0;
+static const double smallest_difference = 1e-6;
 
 static size_t power_of_two_from(size_t least)
 {
@@ -120,15 +120,12 @@ static double exact_period(const double *r, size_t rows, size_t first)
     }
 }
 
-enum period_search_status period_search_run(const double *signal, size_t rows, struct period_search *out_search)
+/// Normalised autocorrelation of `rows` values, owned by the caller; all 0 for a constant, NULL if memory is short.
+static double *correlations_of(const double *signal, size_t rows)
 {
-    *out_search = (struct period_search){0};
-    if (rows < 2 * shortest_period) {
-        return period_search_err_none;
-    }
     double *x = malloc(2 * rows * sizeof *x);
     if (!x) {
-        return period_search_err_memory;
+        return NULL;
     }
     double *r = x + rows;
     double mean = 0.0;
@@ -140,79 +137,63 @@ enum period_search_status period_search_run(const double *signal, size_t rows, s
     }
     if (!autocorrelate(x, rows, r)) {
         free(x);
-        return period_search_err_memory;
+        return NULL;
     }
     /* What is left of a constant after its mean is taken out is rounding, which repeats perfectly. */
-    bool constant = !(r[0] > rounding_power * (r[0] + mean * mean * (double)rows));
+    const bool constant = !(r[0] > rounding_power * (r[0] + mean * mean * (double)rows));
     normalise(x, rows, r);
-    size_t peak = constant ? 0 : first_high_peak(r, rows);
-    enum period_search_status status = period_search_err_none;
-    if (peak > 0) {
-        out_search->exact_samples = exact_period(r, rows, peak);
-        out_search->period_samples = (size_t)llround(out_search->exact_samples);
-        out_search->correlation = r[peak];
-        double drift = fabs(out_search->exact_samples - (double)out_search->period_samples) * (double)(rows / peak);
-        status = drift > tolerated_drift_samples ? period_search_err_fraction : period_search_ok;
+    for (size_t lag = 0; lag < rows; lag++) {
+        x[lag] = constant ? 0.0 : r[lag];
     }
-    free(x);
+    return x;
+}
+
+static enum period_search_status search(const double *r, size_t rows, struct period_search *out_search)
+{
+    const size_t peak = first_high_peak(r, rows);
+    if (peak == 0) {
+        return period_search_err_none;
+    }
+    out_search->exact_samples = exact_period(r, rows, peak);
+    out_search->period_samples = (size_t)llround(out_search->exact_samples);
+    out_search->correlation = r[peak];
+    const double drift = fabs(out_search->exact_samples - (double)out_search->period_samples) * (double)(rows / peak);
+    return drift > tolerated_drift_samples ? period_search_err_fraction : period_search_ok;
+}
+
+enum period_search_status period_search_run(const double *signal, size_t rows, struct period_search *out_search)
+{
+    *out_search = (struct period_search){0};
+    if (rows < 2 * shortest_period) {
+        return period_search_err_none;
+    }
+    double *r = correlations_of(signal, rows);
+    const enum period_search_status status = r ? search(r, rows, out_search) : period_search_err_memory;
+    free(r);
     return status;
 }
 
-static int compare_falling(const void *left, const void *right)
+static bool is_multiple(size_t given, double period)
 {
-    double a = *(const double *)left;
-    double b = *(const double *)right;
-    return (a < b) - (a > b);
+    const double times = round((double)given / period);
+    return times >= 1.0 && fabs((double)given - times * period) <= tolerated_distance_samples;
 }
 
-/// The magnitude in the middle of the widest gap between lines; 0 if no gap is as wide as `clear_gap`.
-static double gap_below_excited(double *magnitudes, size_t count)
+enum period_search_status period_search_check(const double *signal, size_t rows, size_t given,
+                                              struct period_check *out_check)
 {
-    double widest = clear_gap;
-    double middle = 0.0;
-    qsort(magnitudes, count, sizeof *magnitudes, compare_falling);
-    for (size_t i = 1; i < count; i++) {
-        if (magnitudes[i - 1] > widest * magnitudes[i]) {
-            widest = magnitudes[i - 1] / magnitudes[i];
-            middle = sqrt(magnitudes[i - 1] * magnitudes[i]);
-        }
+    *out_check = (struct period_check){.refuted = false};
+    if (rows < 2 * shortest_period || given == 0 || given >= rows) {
+        return period_search_err_none;
     }
-    return middle;
-}
-
-/// Magnitude of a bin's mean; 0 if its scatter could explain it.
-static double certain_magnitude(const double complex *spectra, size_t periods, size_t stride, size_t bin)
-{
-    struct circle line = circle_of_column(spectra, periods, stride, bin);
-    return circle_chance_of_zero(&line) < chance_of_false_line ? cabs(line.mean) : 0.0;
-}
-
-bool period_search_bins(const double complex *spectra, size_t periods, size_t bin_total, size_t stride,
-                        uint32_t *out_bins, size_t *out_count)
-{
-    *out_count = 0;
-    double *magnitudes = malloc(2 * bin_total * sizeof *magnitudes);
-    if (!magnitudes) {
-        return false;
+    double *r = correlations_of(signal, rows);
+    enum period_search_status status = r ? search(r, rows, &out_check->found) : period_search_err_memory;
+    if (status == period_search_ok || status == period_search_err_fraction) {
+        out_check->correlation = r[given];
+        const double missing = 1.0 - out_check->found.correlation;
+        out_check->refuted = !is_multiple(given, out_check->found.exact_samples) &&
+                             1.0 - r[given] > clearly_worse * missing + smallest_difference;
     }
-    double *candidates = magnitudes + bin_total;
-    double largest = 0.0;
-    for (size_t k = 1; k < bin_total; k++) {
-        magnitudes[k] = certain_magnitude(spectra, periods, stride, k);
-        largest = fmax(largest, magnitudes[k]);
-    }
-    size_t count = 0;
-    for (size_t k = 1; k < bin_total; k++) {
-        if (magnitudes[k] > 0.0 && magnitudes[k] >= smallest_line * largest) {
-            candidates[count++] = magnitudes[k];
-        }
-    }
-    double least = fmax(gap_below_excited(candidates, count), smallest_line * largest);
-    for (size_t k = 1; k < bin_total; k++) {
-        if (magnitudes[k] > 0.0 && magnitudes[k] >= least) {
-            out_bins[(*out_count)++] = (uint32_t)k;
-        }
-    }
-    free(magnitudes);
-    return true;
+    free(r);
+    return status;
 }

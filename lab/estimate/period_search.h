@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/// Finds the period and the excited lines of a recording that does not say them.
+/// Finds the period of a recording that does not say it, and checks one that somebody said.
 #ifndef SERVOSCOPE_ESTIMATE_PERIOD_SEARCH_H
 #define SERVOSCOPE_ESTIMATE_PERIOD_SEARCH_H
 
-#include <complex.h>
 #include <stdbool.h>
 #include <stddef.h>
-#include <stdint.h>
 
 enum period_search_status {
     period_search_ok = 0,
@@ -31,16 +29,17 @@ struct period_search {
 /// Test:      tests/unit/test_period_search.c
 enum period_search_status period_search_run(const double *signal, size_t rows, struct period_search *out_search);
 
-/// Finds the excited bins from the input's spectra at all bins.
-/// A bin is a candidate if its mean over periods is at least 1 % of the largest bin's, and if its scatter from period
-/// to period cannot explain it (F test at 1e-6, two periods or more). In a loop other bins repeat too, as distortion:
-/// where the candidates' sizes have a gap of a factor 3 or more, only those above the widest one are excited. The mean
-/// (bin 0) is never one.
-///
-/// Shapes: spectra: periods x stride, of which the first bin_total bins are looked at; out_bins: bin_total
-/// Errors: false if memory is short
+/// What a signal says to a period that somebody gave.
+struct period_check {
+    struct period_search found; ///< what period_search_run finds; zeros if nothing
+    double correlation;         ///< of the signal with itself one given period later
+    bool refuted; ///< the given one is no multiple of the one found, and misses more than twice as much of 1
+};
+
+/// Compares a given period with what the signal repeats after. Where nothing repeats nothing is refuted.
+/// Errors: as period_search_run; period_search_err_none also with less than one given period
 /// Test:   tests/unit/test_period_search.c
-bool period_search_bins(const double complex *spectra, size_t periods, size_t bin_total, size_t stride,
-                        uint32_t *out_bins, size_t *out_count);
+enum period_search_status period_search_check(const double *signal, size_t rows, size_t given,
+                                              struct period_check *out_check);
 
 #endif

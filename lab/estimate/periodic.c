@@ -2,14 +2,21 @@
 #include "lab/estimate/periodic.h"
 
 #include "lab/estimate/columns.h"
+#include "lab/estimate/line_search.h"
 #include "lab/estimate/period_search.h"
+#include "lab/estimate/ramp.h"
 #include "lab/estimate/spectra.h"
+#include "lab/numeric/large.h"
+#include "lab/numeric/vector.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const double two_pi = 6.283185307179586476925;
+/// Rounding of sums and transforms against the largest number that takes part in them, with a margin.
+static const double rounding = 1e-12;
+/// A ramp's own numbers may have been rounded to a few digits.
+static const double rounding_of_ramp = 1e-6;
 
 static int refuse_memory(const struct run *run, struct error *out_error)
 {
@@ -25,7 +32,12 @@ static int choose_period(struct periodic *self, size_t wanted, struct error *out
         return 0;
     }
     struct period_search found;
-    switch (period_search_run(run_column(run, self->input), run->rows, &found)) {
+    double *owned;
+    const double *filled = columns_filled(run, self->input, &owned);
+    const enum period_search_status status =
+        filled ? period_search_run(filled, run->rows, &found) : period_search_err_memory;
+    free(owned);
+    switch (status) {
     case period_search_ok:
         self->period_samples = found.period_samples;
         self->period_found = true;
@@ -71,30 +83,50 @@ static int count_periods(struct periodic *self, struct error *out_error)
     return 0;
 }
 
+static size_t first_lost_row_of(const struct periodic *self, size_t period)
+{
+    return columns_first_lost_row(self->run, period * self->period_samples, self->period_samples);
+}
+
+static int search_lines(struct periodic *self, const struct line_search *search, struct error *out_error)
+{
+    const struct run *run = self->run;
+    struct line_search_result found;
+    if (!line_search_run(search, &found)) {
+        line_search_result_free(&found);
+        return refuse_memory(run, out_error);
+    }
+    self->bins = found.bins;
+    self->bin_count = found.count;
+    self->doubtful = found.doubtful;
+    self->doubtful_count = found.doubtful_count;
+    self->bins_found = true;
+    if (self->bin_count > 0) {
+        return 0;
+    }
+    return error_set(out_error, error_refused,
+                     "%s: the file has no key excited_bins, and no line of %s repeats from period to period of %zu "
+                     "samples: expected an excited input, see --input, or --lines",
+                     run->path, self->input, self->period_samples);
+}
+
 static int find_bins(struct periodic *self, struct error *out_error)
 {
     const struct run *run = self->run;
-    size_t all = self->period_samples / 2 + 1;
-    double complex *spectra = malloc(self->total * all * sizeof *spectra);
-    self->bins = malloc(all * sizeof *self->bins);
-    /* The first period holds the transient: it would only add scatter. */
-    size_t first = self->total > 2 ? 1 : 0;
-    const double *signal = run_column(run, self->input) + first * self->period_samples;
-    size_t counted = self->total - first;
-    bool done = spectra && self->bins && spectra_transform_all(signal, self->period_samples, counted, spectra) &&
-                period_search_bins(spectra, counted, (self->period_samples + 1) / 2, all, self->bins, &self->bin_count);
-    free(spectra);
-    if (!done) {
-        return refuse_memory(run, out_error);
+    struct line_search search;
+    int status = 0;
+    if (!line_search_transform(run, self->input, self->period_samples, self->total, &search)) {
+        status = refuse_memory(run, out_error);
+    } else if (search.periods < 2) {
+        status = error_set(out_error, error_refused,
+                           "%s: %zu of %zu periods count (%zu left out for lost samples): expected at least 2, to find "
+                           "the lines by their power and for the standard deviation",
+                           run->path, search.periods, self->total, self->total - search.periods);
+    } else {
+        status = search_lines(self, &search, out_error);
     }
-    self->bins_found = true;
-    if (self->bin_count == 0) {
-        return error_set(
-            out_error, error_refused,
-            "%s: the file has no key excited_bins, and no line of %s repeats from period to period: say --lines",
-            run->path, self->input);
-    }
-    return 0;
+    line_search_free(&search);
+    return status;
 }
 
 static int choose_bins(struct periodic *self, const struct periodic_options *options, struct error *out_error)
@@ -120,11 +152,6 @@ static int choose_bins(struct periodic *self, const struct periodic_options *opt
     memcpy(self->bins, bins, count * sizeof *self->bins);
     self->bin_count = count;
     return 0;
-}
-
-static size_t first_lost_row_of(const struct periodic *self, size_t period)
-{
-    return columns_first_lost_row(self->run, period * self->period_samples, self->period_samples);
 }
 
 static int measure_settling(struct periodic *self, const bool *usable, struct error *out_error)
@@ -210,52 +237,133 @@ static double complex *keep_used(const struct periodic *self, double complex *io
     return first;
 }
 
-/// Slope of the line through the means of the periods that count.
-static double slope_of_means(const struct periodic *self, const double *signal)
+/// Sums of the periods that count, as spectra with one bin each; NULL if memory is short.
+static double complex *sum_periods(const struct periodic *self, const double *signal)
 {
-    double mean_period = 0.0;
-    for (size_t i = 0; i < self->used; i++) {
-        mean_period += (double)self->used_periods[i] / (double)self->used;
-    }
-    double product = 0.0;
-    double square = 0.0;
-    for (size_t i = 0; i < self->used; i++) {
+    double complex *sums = calloc(self->used, sizeof *sums);
+    for (size_t i = 0; i < self->used && sums; i++) {
         const double *x = signal + self->used_periods[i] * self->period_samples;
-        double mean = 0.0;
-        for (size_t n = 0; n < self->period_samples; n++) {
-            mean += x[n] / (double)self->period_samples;
-        }
-        double distance = (double)self->used_periods[i] - mean_period;
-        product += distance * mean;
-        square += distance * distance;
+        sums[i] = vector_sum(self->period_samples, x);
     }
-    return product / square / (double)self->period_samples;
+    return sums;
 }
 
 /// An integrating output drifts when the speed has a mean: a ramp, which is not periodic and leaks into every line in
 /// the same way in every period, so that no scatter betrays it. Its transform is known: sum_n n exp(-jwn) = N /
 /// (exp(-jw) - 1).
-static void take_out_trend(struct periodic *self)
+static int take_out_trend(struct periodic *self, struct error *out_error)
 {
     if (!columns_is_position(self->output)) {
-        return;
+        return 0;
     }
-    double length = (double)self->period_samples;
-    self->trend_per_sample = slope_of_means(self, run_column(self->run, self->output));
+    double complex *sums = sum_periods(self, run_column(self->run, self->output));
+    if (!sums) {
+        return refuse_memory(self->run, out_error);
+    }
+    self->trend_per_sample = ramp_slope(sums, 1, self->used_periods, self->used, self->period_samples);
+    free(sums);
     for (size_t b = 0; b < self->bin_count; b++) {
-        double complex ramp = length / (cexp(-I * two_pi * (double)self->bins[b] / length) - 1.0);
+        double complex ramp = ramp_transform(self->bins[b], self->period_samples);
         for (size_t i = 0; i < self->used; i++) {
             self->output_spectra[i * self->bin_count + b] -= self->trend_per_sample * ramp;
         }
     }
+    return 0;
+}
+
+static double power(double complex z)
+{
+    return creal(z) * creal(z) + cimag(z) * cimag(z);
+}
+
+static double larger(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+/// Mean spectra of the input, a ramp taken out that the periods' sums show, and what rounding may leave of each line.
+static void mean_input(const struct periodic *self, const double complex *sums, double complex *out_mean,
+                       double *out_limit)
+{
+    const double slope = ramp_slope(sums, 1, self->used_periods, self->used, self->period_samples);
+    double largest = 0.0;
+    double largest_power = 0.0;
+    memset(out_mean, 0, self->bin_count * sizeof *out_mean);
+    for (size_t i = 0; i < self->used; i++) {
+        largest = fmax(largest, cabs(sums[i]));
+        for (size_t b = 0; b < self->bin_count; b++) {
+            out_mean[b] += self->input_spectra[i * self->bin_count + b];
+        }
+    }
+    for (size_t b = 0; b < self->bin_count; b++) {
+        out_mean[b] /= (double)self->used;
+        largest_power = larger(largest_power, power(out_mean[b]));
+    }
+    largest = fmax(largest, sqrt(largest_power));
+    for (size_t b = 0; b < self->bin_count; b++) {
+        const double complex ramp = slope * ramp_transform(self->bins[b], self->period_samples);
+        out_mean[b] -= ramp;
+        out_limit[b] = larger(rounding * largest, rounding_of_ramp * sqrt(power(ramp)));
+    }
+}
+
+/// Sets lines to 0 that hold nothing but rounding. Returns how many do not; *out_strongest is the strongest of all.
+static size_t silence_lines(struct periodic *self, const double complex *mean, const double *limit,
+                            size_t *out_strongest)
+{
+    size_t powered = 0;
+    double strongest = 0.0;
+    *out_strongest = 0;
+    for (size_t b = 0; b < self->bin_count; b++) {
+        const double magnitude = sqrt(power(mean[b]));
+        *out_strongest = magnitude > strongest ? b : *out_strongest;
+        strongest = larger(strongest, magnitude);
+        powered += magnitude > limit[b];
+        for (size_t i = 0; i < self->used && !(magnitude > limit[b]); i++) {
+            self->input_spectra[i * self->bin_count + b] = 0.0;
+        }
+    }
+    return powered;
+}
+
+static int refuse_silence(const struct periodic *self, size_t strongest, double magnitude, double limit,
+                          struct error *out_error)
+{
+    const double to_amplitude = 2.0 / (double)self->period_samples;
+    const double step_hz = self->run->sample_rate_hz / (double)self->period_samples;
+    return error_set(out_error, error_refused,
+                     "%s: %s has no power on any of %zu lines: the strongest, %.6g Hz, has an amplitude of %.2g, and "
+                     "rounding alone may leave %.2g: expected a signal that excites the drive, see --input, --lines",
+                     self->run->path, self->input, self->bin_count, (double)self->bins[strongest] * step_hz,
+                     magnitude * to_amplitude, limit * to_amplitude);
+}
+
+/// What rounding makes of a constant or a ramp is the same in all periods: scatter does not tell it from a line.
+static int check_power(struct periodic *self, struct error *out_error)
+{
+    double complex *sums = sum_periods(self, run_column(self->run, self->input));
+    double complex *mean = malloc(self->bin_count * sizeof *mean);
+    double *limit = malloc(self->bin_count * sizeof *limit);
+    int status = sums && mean && limit ? 0 : refuse_memory(self->run, out_error);
+    if (!status) {
+        size_t strongest;
+        mean_input(self, sums, mean, limit);
+        if (silence_lines(self, mean, limit, &strongest) == 0) {
+            status = refuse_silence(self, strongest, cabs(mean[strongest]), limit[strongest], out_error);
+        }
+    }
+    free(sums);
+    free(mean);
+    free(limit);
+    return status;
 }
 
 static int transform_and_select(struct periodic *self, const struct periodic_options *options, struct error *out_error)
 {
     const struct run *run = self->run;
     size_t size = self->total * self->bin_count;
-    self->input_spectra = malloc(size * sizeof *self->input_spectra);
-    self->output_spectra = malloc(size * sizeof *self->output_spectra);
+    self->input_spectra = large_allocate(size * sizeof *self->input_spectra);
+    self->output_spectra = large_allocate(size * sizeof *self->output_spectra);
     self->owned_spectra[0] = self->input_spectra;
     self->owned_spectra[1] = self->output_spectra;
     bool *usable = malloc(self->total * sizeof *usable);
@@ -277,7 +385,8 @@ static int transform_and_select(struct periodic *self, const struct periodic_opt
     if (!status) {
         self->input_spectra = keep_used(self, self->input_spectra);
         self->output_spectra = keep_used(self, self->output_spectra);
-        take_out_trend(self);
+        status = take_out_trend(self, out_error);
+        status = status ? status : check_power(self, out_error);
     }
     return status;
 }
@@ -322,6 +431,7 @@ bool periodic_transform_used(const struct periodic *self, const char *column, do
 void periodic_free(struct periodic *self)
 {
     free(self->bins);
+    free(self->doubtful);
     free(self->used_periods);
     free(self->input_level);
     free(self->output_level);

@@ -40,11 +40,14 @@ struct periodic {
     const char *reference; ///< NULL: none
     bool aperiodic;        ///< refused because nothing says a period and none was found; kept when a cut is refused
     size_t period_samples;
-    bool period_found; ///< by its repetition, not said
+    double true_period_samples; ///< before it was resampled; 0: as period_samples
+    bool period_found;          ///< by its repetition, not said
     size_t bin_count;
-    uint32_t *bins;  ///< ascending, 1 .. (period_samples - 1)/2
-    bool bins_found; ///< by their power, not said
-    size_t total;    ///< whole periods in the recording
+    uint32_t *bins;     ///< ascending, 1 .. (period_samples - 1)/2
+    bool bins_found;    ///< by their power, not said
+    uint32_t *doubtful; ///< where bins were found: others where the input has power (line_search.h); ascending
+    size_t doubtful_count;
+    size_t total; ///< whole periods in the recording
     enum periodic_settle settle_source;
     size_t settle;           ///< leading periods left out for settling
     size_t lost;             ///< later periods left out because samples of theirs were lost
@@ -62,10 +65,11 @@ struct periodic {
 
 /// Cuts a run into periods and transforms those that count.
 ///
+/// Power:  on a line where the mean input, its drift taken out, is not above rounding (1e-12 of its largest mean, drift
+///         or line), all input_spectra are set to 0, so that no method takes it for excited
 /// Errors: error_refused with what to give or mend: no such column, no period or lines said nor found, lines beyond
-/// half
-///         the rate, fewer than two periods left (no standard deviation could be given); *out_self needs no freeing
-///         then
+///         half the rate, no line with power, fewer than two periods left (no standard deviation could be given);
+///         *out_self needs no freeing then
 /// Lifetime: `run` must outlive *out_self
 /// Test:   tests/unit/test_frf_mean.c, tests/fault/test_frf_refusals.c
 int periodic_cut(const struct run *run, const struct periodic_options *options, struct periodic *out_self,

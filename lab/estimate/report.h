@@ -8,7 +8,7 @@
 
 #include <stddef.h>
 
-enum { frf_report_curves_max = 4 };
+enum { frf_report_curves_max = 4, frf_report_runs_max = 4 };
 
 /// A model's response at any frequencies, ascending; it is held against the measured lines at equal frequencies.
 struct frf_model_curve {
@@ -17,18 +17,27 @@ struct frf_model_curve {
     const double *frequency_hz;
     const double *real;
     const double *imag;
+    const double *std; ///< its own standard deviation; NULL: not known
 };
 
 struct frf_report_options {
-    double known_delay_s; ///< taken out of every phase shown (half a sample of hold, a known dead time); 0: none
-    size_t curve_count;   ///< at most frf_report_curves_max
+    double known_delay_s;     ///< taken out of every phase shown (half a sample of hold, a known dead time); 0: none
+    const char *delay_reason; ///< what it comes from, for the caption; NULL: not said
+    size_t curve_count;       ///< at most frf_report_curves_max
     const struct frf_model_curve *curves;
+    size_t run_count;       ///< realisations whose mean the response is; more than frf_report_runs_max: not drawn
+    const struct frf *runs; ///< their responses, the same lines
+    const char *const *run_names;
 };
 
-/// Adds a section: magnitude in dB with a band of 2 std, phase, standard deviations (total, and noise where it
-/// differs), and with models the error of each over 2 std, line by line: a perfect model stays below 1.
+/// Adds a section: magnitude in dB with its 95 % regions, phase, standard deviations (total, and noise where it
+/// differs), coherence where a method gives it, and how far each line is from what it should be, over 2 std: from the
+/// models, else from its neighbours (lab/estimate/smoothness.h). A perfect model stays below 1.
+/// Measured lines are points that nothing joins; runs are overlaid. A response that is itself a model's (method
+/// `parametric`) is drawn as a line and called one.
 /// `options` may be NULL. Lines that are not valid are left out and counted.
 /// Errors: if memory is short the figure is replaced by a sentence that says so.
+/// Test:   tests/unit/test_frf_report.c
 void frf_report_section(struct page *page, const struct frf *frf, const struct frf_report_options *options);
 
 #endif

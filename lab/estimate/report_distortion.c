@@ -69,18 +69,28 @@ static bool any_known(const struct frf *frf, const double *thd_db)
     return false;
 }
 
+static void add_points(struct figure_panel *panel, const char *name, const struct levels *levels, int curve,
+                       enum figure_colour colour, enum figure_marker marker)
+{
+    struct figure_series *points =
+        figure_add_points(panel, name, levels->count, levels->frequency_hz, levels->decibel[curve]);
+    points->colour = colour;
+    points->marker = marker;
+}
+
 static void add_levels(struct page *page, const struct levels *levels)
 {
     struct figure figure;
     figure_start(&figure, "frequency in Hz", axis_log);
     struct figure_panel *panel = figure_add_panel(&figure, "dB of one unit of the response", axis_linear);
-    figure_add_line(panel, "response", levels->count, levels->frequency_hz, levels->decibel[curve_response]);
-    figure_add_line(panel, "noise", levels->count, levels->frequency_hz, levels->decibel[curve_noise]);
+    add_points(panel, "response", levels, curve_response, figure_blue, figure_circle);
+    add_points(panel, levels->total_differs ? "std of the noise" : "std", levels, curve_noise, figure_grey,
+               figure_cross);
     if (levels->total_differs) {
-        figure_add_line(panel, "std, total", levels->count, levels->frequency_hz, levels->decibel[curve_total]);
+        add_points(panel, "std, total", levels, curve_total, figure_ink, figure_diamond);
     }
-    figure_add_points(panel, "odd", levels->count, levels->frequency_hz, levels->decibel[curve_odd]);
-    figure_add_points(panel, "even", levels->count, levels->frequency_hz, levels->decibel[curve_even]);
+    add_points(panel, "odd", levels, curve_odd, figure_vermilion, figure_triangle);
+    add_points(panel, "even", levels, curve_even, figure_green, figure_square);
     page_add_figure(
         page, &figure,
         "Distortion of odd and of even order, from the bins between the lines that nothing excites, as output "

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/resample.h"
 
+#include "lab/estimate/columns.h"
 #include "lab/record/run_names.h"
 
 #include <math.h>
@@ -202,8 +203,13 @@ int resample_run(const struct run *run, const struct resample_warp *warp, size_t
     fit_periods(out_run);
     bool done = kernel && run->rows > period_samples && period_samples > 0 && copy_keys(run, out_run);
     for (size_t c = 0; c < run->column_count && done; c++) {
-        const struct source source = {run->columns[c].data, run->rows, period_samples};
-        done = !is_kept(run->columns[c].name) || resample_column(kernel, &source, warp, run->columns[c].name, out_run);
+        const char *name = run->columns[c].name;
+        double *owned = NULL;
+        /* What stands in lost samples would get into those around them. */
+        const double *values = strcmp(name, "valid") == 0 ? run->columns[c].data : columns_filled(run, name, &owned);
+        const struct source source = {values, run->rows, period_samples};
+        done = values && (!is_kept(name) || resample_column(kernel, &source, warp, name, out_run));
+        free(owned);
     }
     free(kernel);
     if (done) {

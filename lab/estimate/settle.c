@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/settle.h"
 
+#include "lab/numeric/clones.h"
 #include "lab/numeric/statistics.h"
 
 #include <math.h>
@@ -15,6 +16,7 @@ static const double rounding_power = 1e-28;
 /// Products of 1 + F/dof stay below the largest double; a deviation beyond the factor is beyond chance anyhow.
 static const double largest_product = 1e100;
 static const double largest_factor = 1e90;
+static const double largest_step = 1e200;
 /// A transient is measured where its power is this many times the scatter's.
 static const double measurable = 4.0;
 
@@ -23,7 +25,7 @@ static double power(double complex z)
     return creal(z) * creal(z) + cimag(z) * cimag(z);
 }
 
-/// Lines are judged in blocks whose values of all periods stay in the second cache while they are passed over thrice.
+/// Lines are judged in blocks whose values of all periods stay in the second cache while they are passed over.
 enum { block_lines = 512, block_values = 16384, fewest_block_lines = 16 };
 
 static size_t lines_in_block(size_t periods)
@@ -32,10 +34,11 @@ static size_t lines_in_block(size_t periods)
     return lines > block_lines ? block_lines : lines < fewest_block_lines ? fewest_block_lines : lines;
 }
 
-/// The usable periods of the later half: what a settled period looks like, line by line.
+/// A block of lines: what a settled period looks like after the usable periods of the later half, line by line.
 struct reference {
     double complex mean[block_lines];
     double scale[block_lines]; ///< 1 / ((1 + 1/M) variance dof); 0 without scatter
+    double *deviations;        ///< |Y_p - Ybar|^2, periods x lines
 };
 
 /// All lines together.
@@ -57,29 +60,41 @@ static double expected_deviation(double scatter, double complex mean, double cou
     return (scatter / (count - 1.0) + rounding_power * power(mean)) * (1.0 + 1.0 / count);
 }
 
-/// `spectra` begins at the block's first line.
-static void make_reference(const double complex *spectra, size_t periods, size_t bin_count, size_t lines,
-                           const bool *usable, struct totals *io_totals, struct reference *out)
+static void subtract_mean(const double complex *spectra, const double complex *mean, size_t lines,
+                          double *restrict out_deviations)
 {
-    memset(out, 0, sizeof *out);
+    for (size_t b = 0; b < lines; b++) {
+        out_deviations[b] = power(spectra[b] - mean[b]);
+    }
+}
+
+/// `spectra` begins at the block's first line.
+CLONED_FOR_AVX2 static void make_reference(const double complex *spectra, size_t periods, size_t bin_count,
+                                           size_t lines, const bool *usable, struct totals *io_totals,
+                                           struct reference *io_self)
+{
+    memset(io_self->mean, 0, sizeof io_self->mean);
+    memset(io_self->scale, 0, sizeof io_self->scale);
     for (size_t p = periods / 2; p < periods; p++) {
         for (size_t b = 0; b < lines && usable[p]; b++) {
-            out->mean[b] += spectra[p * bin_count + b];
+            io_self->mean[b] += spectra[p * bin_count + b];
         }
     }
     for (size_t b = 0; b < lines; b++) {
-        out->mean[b] /= (double)io_totals->count;
+        io_self->mean[b] /= (double)io_totals->count;
     }
-    for (size_t p = periods / 2; p < periods; p++) {
-        for (size_t b = 0; b < lines && usable[p]; b++) {
-            out->scale[b] += power(spectra[p * bin_count + b] - out->mean[b]);
+    for (size_t p = 0; p < periods; p++) {
+        double *deviations = io_self->deviations + p * lines;
+        subtract_mean(spectra + p * bin_count, io_self->mean, lines, deviations);
+        for (size_t b = 0; b < lines && usable[p] && p >= periods / 2; b++) {
+            io_self->scale[b] += deviations[b];
         }
     }
     for (size_t b = 0; b < lines; b++) {
         double dof = (double)(io_totals->count - 1);
-        double expected = expected_deviation(out->scale[b], out->mean[b], (double)io_totals->count);
-        out->scale[b] = expected > 0.0 ? 1.0 / (expected * dof) : 0.0;
-        io_totals->signal += power(out->mean[b]);
+        double expected = expected_deviation(io_self->scale[b], io_self->mean[b], (double)io_totals->count);
+        io_self->scale[b] = expected > 0.0 ? 1.0 / (expected * dof) : 0.0;
+        io_totals->signal += power(io_self->mean[b]);
         io_totals->scatter += expected;
     }
 }
@@ -91,22 +106,52 @@ static double chance_factor(double deviation, double scale)
     return 1.0 + (ratio < largest_factor ? ratio : largest_factor);
 }
 
-static void compare_period(const double complex *spectra, size_t lines, const struct reference *reference, double dof,
-                           struct comparison *io_period)
+/// Lines judged in one step, by a tree of products and sums: in a row each would wait for the one before.
+enum { step_lines = 8 };
+
+static double sum_of_step(const double x[step_lines])
 {
-    /* A logarithm of a product now and then in place of one for each line: most of the time went there. Two lines a
-     * step, because each multiplication waits for the one before. */
+    return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]));
+}
+
+static double factor_of_step(const double deviations[step_lines], const double scale[step_lines])
+{
+    double x[step_lines];
+    for (size_t i = 0; i < step_lines; i++) {
+        x[i] = 1.0 + deviations[i] * scale[i];
+    }
+    double product = ((x[0] * x[4]) * (x[2] * x[6])) * ((x[1] * x[5]) * (x[3] * x[7]));
+    return product;
+}
+
+static void multiply(double factor, double dof, double *io_product, struct comparison *io_period)
+{
+    *io_product *= factor;
+    if (*io_product > largest_product) {
+        io_period->log_chance -= dof * log(*io_product);
+        *io_product = 1.0;
+    }
+}
+
+CLONED_FOR_AVX2 static void compare_period(const double *deviations, size_t lines, const double *scale, double dof,
+                                           struct comparison *io_period)
+{
+    /* A logarithm of a product now and then in place of one for each line: most of the time went there. */
     double product = 1.0;
-    for (size_t b = 0; b < lines; b += 2) {
-        size_t next = b + 1 < lines ? b + 1 : b;
-        double deviation = power(spectra[b] - reference->mean[b]);
-        double other = next > b ? power(spectra[next] - reference->mean[next]) : 0.0;
-        product *= chance_factor(deviation, reference->scale[b]) * chance_factor(other, reference->scale[next]);
-        if (product > largest_product) {
-            io_period->log_chance -= dof * log(product);
-            product = 1.0;
+    size_t b = 0;
+    while (b < lines) {
+        if (b + step_lines <= lines) {
+            double factor = factor_of_step(deviations + b, scale + b);
+            if (factor < largest_step) {
+                multiply(factor, dof, &product, io_period);
+                io_period->deviation += sum_of_step(deviations + b);
+                b += step_lines;
+                continue;
+            }
         }
-        io_period->deviation += deviation + other;
+        multiply(chance_factor(deviations[b], scale[b]), dof, &product, io_period);
+        io_period->deviation += deviations[b];
+        b++;
     }
     io_period->log_chance -= dof * log(product);
 }
@@ -148,15 +193,17 @@ bool settle_measure(const double complex *spectra, size_t periods, size_t bin_co
     if (periods < fewest_periods || totals.count < 2 || bin_count == 0) {
         return true;
     }
+    size_t block = lines_in_block(periods);
     struct reference *reference = malloc(sizeof *reference);
     struct comparison *compared = calloc(periods, sizeof *compared);
-    bool done = reference && compared;
-    size_t block = lines_in_block(periods);
+    double *deviations = malloc(block * periods * sizeof *deviations);
+    bool done = reference && compared && deviations;
     for (size_t first = 0; first < bin_count && done; first += block) {
         size_t lines = bin_count - first < block ? bin_count - first : block;
+        reference->deviations = deviations;
         make_reference(spectra + first, periods, bin_count, lines, usable, &totals, reference);
         for (size_t p = 0; p < periods; p++) {
-            compare_period(spectra + p * bin_count + first, lines, reference, (double)(totals.count - 1), &compared[p]);
+            compare_period(deviations + p * lines, lines, reference->scale, (double)(totals.count - 1), &compared[p]);
         }
     }
     if (done) {
@@ -164,6 +211,7 @@ bool settle_measure(const double complex *spectra, size_t periods, size_t bin_co
     }
     free(reference);
     free(compared);
+    free(deviations);
     return done;
 }
 

@@ -12,14 +12,15 @@
 /// Equation:  Y_{p,b} = sum_{n=0}^{N-1} y[p N + n] exp(-j 2 pi k_b n / N)
 /// Shapes:    signal: periods x period_samples; bins: bin_count; out_spectra: periods x bin_count, period-major
 /// Units:     those of the signal times samples: a sine of amplitude A on bin k gives |Y| = A N / 2
-/// Range:     bins below period_samples (0 is the sum of the samples); period_samples >= 1
+/// Range:     bins below period_samples (0 is the sum of the samples; NULL: 0 .. bin_count - 1); period_samples >= 1
 /// Errors:    false if memory is short
-/// Cost:      a direct sum against one table of twiddles, or an FFT, whichever needs less (spectra_prefers_fft)
+/// Cost:      one complex FFT for two periods, also where few bins are wanted: a table of twiddles for direct sums takes
+///            longer to make than the FFT
 /// Test:      tests/unit/test_spectra.c
 bool spectra_transform_periods(const double *signal, size_t period_samples, size_t periods, const uint32_t *bins,
                                size_t bin_count, double complex *out_spectra);
 
-/// Transforms the periods of two signals at the same bins, a period of one beside that of the other where an FFT pays.
+/// Transforms the periods of two signals at the same bins, a period of one beside that of the other.
 /// Shapes: first, second: periods x period_samples; out_first, out_second: periods x bin_count, period-major
 bool spectra_transform_both(const double *first, const double *second, size_t period_samples, size_t periods,
                             const uint32_t *bins, size_t bin_count, double complex *out_first,
@@ -33,9 +34,5 @@ bool spectra_transform_all(const double *signal, size_t period_samples, size_t p
 /// Errors: false if memory is short
 bool spectra_transform_two(const double *first, const double *second, size_t rows, double complex *out_first,
                            double complex *out_second);
-
-/// Tells whether an FFT of this length beats a direct sum over bin_count bins. KissFFT costs about N times the sum of
-/// the length's prime factors, so that a prime length is cheaper by the sum unless most bins are wanted.
-bool spectra_prefers_fft(size_t period_samples, size_t bin_count);
 
 #endif

@@ -87,6 +87,14 @@ struct figure_series *figure_add_band(struct figure_panel *self, const char *nam
     return series;
 }
 
+struct figure_series *figure_add_spans(struct figure_panel *self, const char *name, size_t count, const double *x,
+                                       const double *low, const double *high)
+{
+    struct figure_series *series = add_series(self, figure_spans, name, high != NULL ? count : 0, x, low);
+    series->y2 = high;
+    return series;
+}
+
 struct figure_series *figure_add_stems(struct figure_panel *self, const char *name, size_t count, const double *x,
                                        const double *y)
 {

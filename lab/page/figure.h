@@ -12,7 +12,7 @@
 /// Conventions for the whole interface:
 /// - Labels are copied, arrays are borrowed until figure_write(). An `x` of NULL means 0, 1, 2, ...
 /// - Values that have no place (NaN, infinite, not positive on a log axis) are gaps: a line is broken there, a point is
-///   left out. An infinite band edge reaches to the edge of the frame.
+///   left out. An infinite edge of a band or span reaches to the edge of the frame.
 /// - Nothing to draw is said: "no data" in the panel or beside the name. What lies outside a given range is clipped,
 ///   and the legend says how much.
 /// - Colour never stands alone: every automatic colour comes with its own marker shape or dash.
@@ -63,6 +63,7 @@ enum figure_kind {
     figure_stems,
     figure_bars,
     figure_limit,
+    figure_spans,
 };
 
 /// One series. The add functions set everything; the fields after `y2` may then be changed.
@@ -71,8 +72,8 @@ struct figure_series {
     char name[figure_text_max]; ///< "" keeps it out of the legend
     size_t count;
     const double *x;  ///< NULL: 0, 1, 2, ...
-    const double *y;  ///< the lower edge of a band; NULL for a limit
-    const double *y2; ///< the upper edge of a band
+    const double *y;  ///< the lower edge of a band or span; NULL for a limit
+    const double *y2; ///< the upper edge of a band or span
     double value;     ///< where a limit lies
     enum figure_colour colour;
     enum figure_marker marker;
@@ -117,7 +118,7 @@ struct figure_panel *figure_add_panel(struct figure *self, const char *label, en
 /// Adds a series and returns it, never NULL, so that the style can be changed: `...->colour = figure_green`.
 /// A panel shows figure_series_max series; further ones are counted and the figure says "... and 3 more".
 /// Long lines keep the first, lowest, highest and last sample of every pixel column; points that would cover the same
-/// half pixel are drawn once.
+/// half pixel (of more than 2000: the same pixel, or two where their shape is not a dot) are drawn once.
 struct figure_series *figure_add_line(struct figure_panel *self, const char *name, size_t count, const double *x,
                                       const double *y);
 
@@ -133,6 +134,11 @@ struct figure_series *figure_add_points(struct figure_panel *self, const char *n
 /// that one uncertain point does not flatten the picture.
 struct figure_series *figure_add_band(struct figure_panel *self, const char *name, size_t count, const double *x,
                                       const double *low, const double *high);
+
+/// Adds a vertical line from low to high at each place, for the uncertainty of points that nothing joins. The range as
+/// with a band.
+struct figure_series *figure_add_spans(struct figure_panel *self, const char *name, size_t count, const double *x,
+                                       const double *low, const double *high);
 
 /// Adds a line from zero (the lower edge, on a log axis) to each value, for spectra.
 struct figure_series *figure_add_stems(struct figure_panel *self, const char *name, size_t count, const double *x,

@@ -204,7 +204,7 @@ static void fit_y(struct layout *self, size_t p)
     struct range bands = no_range;
     for (size_t s = 0; s < panel->count; s++) {
         const struct figure_series *series = &panel->series[s];
-        find_series_range(self, panel, series, series->kind == figure_band ? &bands : &data);
+        find_series_range(self, panel, series, plot_is_range(series->kind) ? &bands : &data);
     }
     struct range range = join_bands(data, bands);
     self->empty[p] = is_empty(range);

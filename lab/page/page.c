@@ -11,7 +11,7 @@ static const char style[] =
     "*{box-sizing:border-box}\n"
     "html{background:var(--paper);color:var(--text);-webkit-text-size-adjust:100%}\n"
     "body{margin:0 auto;padding:34px 24px 40px;max-width:868px;font:15px/1.55 system-ui,-apple-system,\"Segoe UI\","
-    "Roboto,\"Helvetica Neue\",Arial,sans-serif}\n"
+    "Roboto,\"Helvetica Neue\",Arial,sans-serif;overflow-wrap:anywhere}\n"
     "header{border-top:3px solid var(--text);border-bottom:1px solid var(--grid);padding:10px 0 "
     "14px;margin-bottom:22px}\n"
     ".mark{font-size:11px;letter-spacing:.16em;text-transform:uppercase;color:var(--dim);margin:0 0 10px}\n"

@@ -14,15 +14,20 @@ static const double far_px = 1e5;
 
 enum { sample_width_px = 24 };
 
+bool plot_is_range(enum figure_kind kind)
+{
+    return kind == figure_band || kind == figure_spans;
+}
+
 struct plot_sample plot_read_sample(const struct figure_series *series, size_t n, enum axis_scale x_scale,
                                     enum axis_scale y_scale)
 {
     struct plot_sample sample;
     sample.x = series->x != NULL ? series->x[n] : (double)n;
     sample.low = series->y[n];
-    sample.high = series->kind == figure_band ? series->y2[n] : sample.low;
+    sample.high = plot_is_range(series->kind) ? series->y2[n] : sample.low;
     sample.shown = axis_can_show(x_scale, sample.x);
-    if (series->kind == figure_band) {
+    if (plot_is_range(series->kind)) {
         sample.shown = sample.shown && sample.high >= sample.low;
     } else {
         sample.shown = sample.shown && axis_can_show(y_scale, sample.low);
@@ -343,9 +348,11 @@ static void write_marker(FILE *out, const struct figure_series *series, double x
     write_move(out, x, y);
     switch (series->marker) {
     case figure_circle:
+        fputs("l0 0", out); /* round line caps draw it; square ones do not survive being printed */
+        break;
     case figure_square:
-        fputs("l0 0", out);
-        break; /* the line caps draw the shape */
+        fprintf(out, "m%.1f %.1fh%.1fv%.1fh%.1fz", -0.9 * r, -0.9 * r, 1.8 * r, 1.8 * r, -1.8 * r);
+        break;
     case figure_triangle:
         fprintf(out, "m%.1f %.1fh%.1fl%.1f %.1fz", -1.3 * r, 0.9 * r, 2.6 * r, -1.3 * r, -2.2 * r);
         break;
@@ -361,11 +368,10 @@ static void write_marker(FILE *out, const struct figure_series *series, double x
 
 static void open_markers(FILE *out, const struct figure_series *series, double r)
 {
-    static const char *const class_names[] = {"pt mc", "pt mf", "pt ms", "pt mx", "pt mf"};
-    double width = series->marker == figure_circle   ? 2.0 * r
-                   : series->marker == figure_square ? 1.8 * r
-                   : series->marker == figure_cross  ? fmax(1.0, 0.55 * r)
-                                                     : 0.0;
+    static const char *const class_names[] = {"pt mc", "pt mf", "pt mf", "pt mx", "pt mf"};
+    double width = series->marker == figure_circle  ? 2.0 * r
+                   : series->marker == figure_cross ? fmax(1.0, 0.55 * r)
+                                                    : 0.0;
     open_path(out, series, class_names[series->marker]);
     fprintf(out, " stroke-width=\"%.1f\" d=\"", width);
 }
@@ -376,19 +382,32 @@ static bool is_inside(const struct plot_area *area, double x, double y)
     return x >= -slack_px && x <= area->width + slack_px && y >= -slack_px && y <= area->height + slack_px;
 }
 
-/* Remembers which half pixels carry a marker already. Without memory for it every marker is drawn. */
+/* Remembers which cells carry a marker already. Without memory for it every marker is drawn. */
 struct stipple {
+    double cells_per_px;
     size_t columns, rows;
     uint8_t *bits;
 };
+
+/* Half a pixel, and where there are too many markers to be told apart, one pixel for dots and two for shapes, which
+   take more to write: a page of 10 000 lines stays below 500 kB. */
+static void stipple_begin(struct stipple *self, const struct figure_series *series, const struct plot_area *area)
+{
+    const size_t many = 2000;
+    const bool dots = series->marker == figure_circle;
+    self->cells_per_px = series->count <= many ? 2.0 : dots ? 1.0 : 0.5;
+    self->columns = (size_t)ceil(self->cells_per_px * area->width) + 1;
+    self->rows = (size_t)ceil(self->cells_per_px * area->height) + 1;
+    self->bits = calloc(self->columns * self->rows / 8 + 1, 1);
+}
 
 static bool stipple_take(struct stipple *self, double x, double y)
 {
     if (self->bits == NULL) {
         return true;
     }
-    size_t column = (size_t)bound(floor(2.0 * x), 0.0, (double)(self->columns - 1));
-    size_t row = (size_t)bound(floor(2.0 * y), 0.0, (double)(self->rows - 1));
+    size_t column = (size_t)bound(floor(self->cells_per_px * x), 0.0, (double)(self->columns - 1));
+    size_t row = (size_t)bound(floor(self->cells_per_px * y), 0.0, (double)(self->rows - 1));
     size_t bit = row * self->columns + column;
     uint8_t mask = (uint8_t)(1u << (bit % 8));
     bool is_new = (self->bits[bit / 8] & mask) == 0;
@@ -399,8 +418,8 @@ static bool stipple_take(struct stipple *self, double x, double y)
 static void write_points(FILE *out, const struct figure_series *series, const struct plot_area *area)
 {
     double r = series->size > 0.0 ? 0.5 * series->size : usual_marker_radius(series->count);
-    struct stipple stipple = {(size_t)ceil(2.0 * area->width) + 1, (size_t)ceil(2.0 * area->height) + 1, NULL};
-    stipple.bits = calloc(stipple.columns * stipple.rows / 8 + 1, 1);
+    struct stipple stipple;
+    stipple_begin(&stipple, series, area);
     open_markers(out, series, r);
     for (size_t n = 0; n < series->count; n++) {
         struct plot_sample sample = read_sample(series, area, n);
@@ -437,6 +456,26 @@ static void write_stems(FILE *out, const struct figure_series *series, const str
         write_move(out, group.x, top);
         fputc('l', out);
         write_pair(out, 0, lround((bottom - top) * tenths_per_px));
+    }
+    fputs("\"/>", out);
+}
+
+static void write_spans(FILE *out, const struct figure_series *series, const struct plot_area *area)
+{
+    open_path(out, series, "sp");
+    fprintf(out, " stroke-width=\"%g\" d=\"", series->size > 0.0 ? series->size : series->count <= 150 ? 1.4 : 1.0);
+    for (size_t n = 0; n < series->count;) {
+        struct group group;
+        if (!next_group(series, area, &n, 1, &group) || group.x < 0.0 || group.x > area->width) {
+            continue;
+        }
+        double top = bound(group.low, 0.0, area->height);
+        double bottom = bound(group.high, 0.0, area->height);
+        if (bottom > top) {
+            write_move(out, group.x, top);
+            fputc('l', out);
+            write_pair(out, 0, lround((bottom - top) * tenths_per_px));
+        }
     }
     fputs("\"/>", out);
 }
@@ -535,6 +574,9 @@ void plot_write_series(FILE *out, const struct figure_series *series, const stru
     case figure_limit:
         write_limit(out, series, area);
         break;
+    case figure_spans:
+        write_spans(out, series, area);
+        break;
     }
 }
 
@@ -562,6 +604,9 @@ void plot_write_sample(FILE *out, const struct figure_series *series, double x, 
         fprintf(out, "<path class=\"sm c%d\" stroke-width=\"1.4\" d=\"M%.1f %.1fv6m4-10v10m4-8v8\"/>", colour,
                 middle - 4.0, y - 1.0);
         break;
+    case figure_spans:
+        fprintf(out, "<path class=\"sp c%d\" stroke-width=\"1.4\" d=\"M%.1f %.1fv10\"/>", colour, middle, y - 5.0);
+        break;
     case figure_bars:
         fprintf(out, "<g class=\"br c%d b%d\"><rect x=\"%.1f\" y=\"%.1f\" width=\"10\" height=\"10\"/></g>", colour,
                 (int)series->dash, middle - 5.0, y - 5.0);
@@ -574,7 +619,7 @@ size_t plot_count_outside(const struct figure_series *series, const struct plot_
     size_t outside = 0;
     for (size_t n = 0; series->kind != figure_limit && n < series->count; n++) {
         struct plot_sample sample = read_sample(series, area, n);
-        if (sample.shown && series->kind != figure_band) {
+        if (sample.shown && !plot_is_range(series->kind)) {
             outside += !is_inside(area, place_x(area, sample.x), place_y(area, sample.low));
         }
     }

@@ -18,9 +18,12 @@ struct plot_area {
 
 /// One sample, for range finding and clipping.
 struct plot_sample {
-    double x, low, high; ///< low and high differ for bands only
+    double x, low, high; ///< low and high differ for bands and spans only
     bool shown;          ///< it has a place on both axes
 };
+
+/// Whether a kind has two values at each place: a band or spans.
+bool plot_is_range(enum figure_kind kind);
 
 /// Fetches sample `n` of a series and tells whether these axis kinds can show it.
 struct plot_sample plot_read_sample(const struct figure_series *series, size_t n, enum axis_scale x_scale,

@@ -80,6 +80,16 @@ static bool join(struct line_reader *self, size_t length)
     return true;
 }
 
+/* zlib puts the file's name in front of its reason. */
+static void damaged(const struct line_reader *self, const char *reason, struct error *out_error)
+{
+    const size_t name = strlen(self->path);
+    if (reason && strncmp(reason, self->path, name) == 0 && strncmp(reason + name, ": ", 2) == 0)
+        reason += name + 2;
+    error_set(out_error, error_refused, "%s:%zu: the gzip file is damaged%s%s", self->path, self->number + 1,
+              reason && *reason ? ": " : "", reason ? reason : "");
+}
+
 /* Reads the next chunk; line_end at the end of the file. zlib reports a gzip file that was cut off, or whose check sum
  * is wrong, only through gzerror once the data is used up. */
 static enum line_status refill(struct line_reader *self, struct error *out_error)
@@ -96,12 +106,15 @@ static enum line_status refill(struct line_reader *self, struct error *out_error
     }
     if (got == 0 && code != Z_BUF_ERROR)
         return line_end;
-    if (code == Z_ERRNO)
-        line_error(self, out_error, strerror(errno));
+    const int system_error = errno;
+    if (code == Z_ERRNO && system_error == EISDIR)
+        error_set(out_error, error_refused, "%s: is a folder: a file was expected", self->path);
+    else if (code == Z_ERRNO)
+        line_error(self, out_error, strerror(system_error));
     else if (code == Z_BUF_ERROR)
         line_error(self, out_error, "the gzip file is cut off, or its check sum is missing");
     else
-        line_error(self, out_error, reason && *reason ? reason : "the gzip file is damaged");
+        damaged(self, reason, out_error);
     return line_failed;
 }
 

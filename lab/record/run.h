@@ -40,6 +40,10 @@ struct run {
 struct run_options {
     const char *map; ///< "torque_Nm=COLUMN[*SCALE],..." or NULL
     double rate_hz;  ///< 0: from the file
+    /// Without a map, name foreign columns by the units in their names. What was named so is the run's key
+    /// `columns_named`, in the form of a map.
+    bool guess;
+    const char *keep[3]; ///< with guess: columns that keep their names; entries may be NULL
 };
 
 /// Reads a run from a .csv or .csv.gz file (recognised by content, not by name).

@@ -2,6 +2,7 @@
 #include "lab/record/run_stream.h"
 
 #include "lab/record/run_checks.h"
+#include "lab/record/run_guess.h"
 #include "lab/record/run_names.h"
 #include "lab/record/text_stream.h"
 
@@ -37,6 +38,18 @@ static int read_keys(struct run_stream *self, struct error *out_error)
     return status;
 }
 
+/* Foreign columns get names, their cells have to be numbers from then on, and a key says so. */
+static int guess_names(struct run_stream *self, struct run_map *out_map, struct error *out_error)
+{
+    const size_t keep_count = sizeof self->options.keep / sizeof self->options.keep[0];
+    int status = run_guess_map(&self->text.table, self->options.keep, keep_count, out_map, out_error);
+    for (size_t i = 0; !status && i < out_map->count; i++)
+        for (size_t c = 0; c < self->text.cell_count; c++)
+            if (strcmp(self->text.table.columns[c].name, out_map->entries[i].source) == 0)
+                self->text.kinds[c] = text_cell_number;
+    return status ? status : run_guess_note(out_map, &self->text.table, out_error);
+}
+
 static int open_all(struct run_stream *self, const char *path, struct error *out_error)
 {
     struct run_map map = {0};
@@ -45,6 +58,10 @@ static int open_all(struct run_stream *self, const char *path, struct error *out
         status = run_map_parse(&map, self->options.map, out_error);
     if (!status)
         status = text_stream_open(path, run_map_judge, &map, &self->text, out_error);
+    if (!status && self->options.guess && map.count == 0) {
+        run_map_free(&map);
+        status = guess_names(self, &map, out_error);
+    }
     if (!status)
         status = run_map_rename(&map, &self->text.table, &self->plan, out_error);
     run_map_free(&map);

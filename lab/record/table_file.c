@@ -490,8 +490,9 @@ size_t table_file_bytes(const struct table *self)
            (size_t)self->samples * self->channels * msgen_format_bytes(self->format);
 }
 
-/* The bytes of the .mst file, which the caller frees. What is written has passed the check that firmware will make. */
-static int encode(const char *path, struct table *self, uint8_t **out_bytes, size_t *out_size, struct error *out_error)
+/* What is written has passed the check that firmware will make. */
+int table_file_encode(const char *path, struct table *self, uint8_t **out_bytes, size_t *out_size,
+                      struct error *out_error)
 {
     uint8_t scratch[msgen_header_bytes];
     if (self->format == 0)
@@ -538,7 +539,7 @@ int table_file_write_mst(const char *path, struct table *self, struct error *out
 {
     uint8_t *bytes = NULL;
     size_t size = 0;
-    if (encode(path, self, &bytes, &size, out_error) != error_none)
+    if (table_file_encode(path, self, &bytes, &size, out_error) != error_none)
         return error_refused;
     struct atomic_file file;
     FILE *stream = atomic_file_open(&file, path, out_error);
@@ -583,7 +584,7 @@ int table_file_write_csv(const char *path, struct table *self, struct error *out
 {
     uint8_t *bytes = NULL;
     size_t size = 0;
-    if (encode(path, self, &bytes, &size, out_error) != error_none)
+    if (table_file_encode(path, self, &bytes, &size, out_error) != error_none)
         return error_refused;
     free(bytes);
     for (uint32_t n = 0; self->acceleration && n < self->samples; n++)
@@ -668,7 +669,7 @@ int table_file_write_header(const char *path, struct table *self, struct error *
 {
     uint8_t *bytes = NULL;
     size_t size = 0;
-    if (encode(path, self, &bytes, &size, out_error) != error_none)
+    if (table_file_encode(path, self, &bytes, &size, out_error) != error_none)
         return error_refused;
     struct atomic_file file;
     FILE *stream = atomic_file_open(&file, path, out_error);

@@ -71,6 +71,11 @@ int table_file_write_csv(const char *path, struct table *self, struct error *out
 /// C99 and C++; names are made of the file's name. Errors and effects on *self as table_file_write_mst().
 int table_file_write_header(const char *path, struct table *self, struct error *out_error);
 
+/// The bytes of the .mst file, to be freed by the caller; `name` is for messages. Errors and effects on *self as
+/// table_file_write_mst().
+int table_file_encode(const char *name, struct table *self, uint8_t **out_bytes, size_t *out_size,
+                      struct error *out_error);
+
 /// Length of the .mst file that this table is or will be, in bytes.
 size_t table_file_bytes(const struct table *self);
 

@@ -265,6 +265,9 @@ static int read_header(struct text_stream *self, text_table_judge judge, void *c
         enum line_status read = line_reader_next(self->lines, &line, out_error);
         if (read == line_failed)
             return error_refused;
+        if (read == line_end && text_stream_line(self) == 0)
+            return error_set(out_error, error_refused, "%s: the file is empty: a row of column names was expected",
+                             self->table.path);
         if (read == line_end)
             return error_set(out_error, error_refused, "%s:%zu: the file ends without a row of column names",
                              self->table.path, text_stream_line(self) + 1);

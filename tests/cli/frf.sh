@@ -97,6 +97,24 @@ grep -q 'periods of 500 samples count.*period found by its repetition; lines fou
 grep -qx '# realisations: 3' frf.csv || fail "three realisations"
 grep -qx '# degrees_of_freedom: 4' frf.csv || fail "degrees of freedom: $(grep degrees frf.csv)"
 
+# A table played twice, other noise: more periods of one realisation, by its key and without; the same recording, refused.
+sed 's/"seed": 3/"seed": 4/' model.json >model4.json
+"$SERVOSCOPE" simulate --model model4.json --table table1.mst --periods 6 --out again.csv --quiet
+sed '/^# table_crc32/d' again.csv >keyless.csv
+for again in again keyless; do
+    "$SERVOSCOPE" frf run1.csv $again.csv --out frf.csv >said
+    grep -qx '# realisations: 1' frf.csv || fail "$again: $(grep realisations frf.csv)"
+    grep -qx '# runs: 2' frf.csv || fail "$again: $(grep runs frf.csv)"
+    grep -qx '# degrees_of_freedom: 20' frf.csv || fail "$again: $(grep degrees frf.csv)"
+    grep -q 'runs 1 and 2 have the same excitation.*2 runs are 1 realisation;' said || fail "$again: $(cat said)"
+done
+"$SERVOSCOPE" frf run1.csv again.csv run2.csv --out frf.csv >said
+grep -qx '# realisations: 2' frf.csv || fail "two of one table: $(grep realisations frf.csv)"
+grep -qx '# sample_rate_hz: 1000' frf.csv || fail "several runs: $(grep '^# ' frf.csv)"
+grep -qx '# period_samples: 500' frf.csv || fail "several runs: $(grep '^# ' frf.csv)"
+rm -f x.csv
+refuse 1 'again: their responses differ by 0 of their noise' run1.csv run2.csv run1.csv --out x.csv
+
 # Lost samples: their period does not count, and the summary says so.
 awk -F, 'BEGIN{OFS=","} /^#/{print; next} !seen{print $0",valid"; seen=1; next} {n++; print $0",",(n==1600?0:1)}' run1.csv |
     sed 's/,,/,/' >lost.csv
@@ -117,11 +135,20 @@ refuse 2 "--order: 'some'" run1.csv --method lpm --order some --out x.csv
 refuse 1 'needs 5000 lines between the excited ones' run1.csv --method lpm --half-width 2500 --out x.csv
 refuse 2 "--settle: 'some', expected a whole number of periods or auto" run1.csv --settle some --out x.csv
 refuse 2 "--settle: '1.5'" run1.csv --settle 1.5 --out x.csv
-refuse 1 "no column 'force_ref_N' to take as the reference" run1.csv --reference force_ref_N --out x.csv
+refuse 1 "no column 'force_ref_N' to take as the reference" run1.csv --method indirect --reference force_ref_N --out x.csv
+refuse 2 '--reference is for --method lpm, h1, indirect, not mean' run1.csv --reference torque_ref_Nm --out x.csv
+refuse 2 '--order is for --method lpm, not hann' run1.csv --method hann --order 2 --out x.csv
+refuse 2 '--half-width is for --method lpm, not indirect' run1.csv --method indirect --half-width 5 --out x.csv
+refuse 2 '--segment is for --method lpm, h1, indirect, not parametric' run1.csv --method parametric --segment 100 --out x.csv
+refuse 2 'run1.csv repeats every 500 samples and is taken period by period' run1.csv --method h1 --segment 100 --out x.csv
 refuse 1 "no column 'force_N'" run1.csv --input force_N --out x.csv
 refuse 1 'none.csv' none.csv --out x.csv
 refuse 1 '1 of 7 periods count (6 left out for settling' run1.csv --settle 6 --out x.csv
 refuse 1 'expected at least 2' run1.csv --period 2000 --out x.csv
+refuse 1 '): expected --period 500' run1.csv --period 499 --out x.csv
+refuse 1 'torque_Nm repeats every 500 samples' foreign.csv --map 'torque_Nm=iq,velocity_rad_per_s=omega' --period 250 --out x.csv
+refuse 1 'input and output are both torque_Nm' run1.csv --output torque_Nm --out x.csv
+refuse 1 'time_s has no power on any of 50 lines: the strongest, ' run1.csv --input time_s --out x.csv
 refuse 2 'is not on the period' run1.csv --lines linear:1:20:1 --out x.csv
 sed '/^# periods/d; 700q' run1.csv >short.csv
 refuse 1 'short.csv' short.csv --out x.csv
@@ -129,7 +156,7 @@ awk -F, 'BEGIN{OFS=","} !/^#/{n++; if (n == 50) $3 = "nan"} {print}' run1.csv >n
 refuse 1 'torque_Nm' nan.csv --out x.csv
 "$SERVOSCOPE" design --rate 1000 --period 500 --lines linear:2:98:2 --limit-torque 1 --inertia 0.005 --method newman --out other --quiet
 "$SERVOSCOPE" simulate --model model.json --table other.mst --periods 3 --out other.csv --quiet
-refuse 1 'run 2 has 49 lines: expected' run1.csv other.csv --out x.csv
+refuse 1 'run 2 (other.csv) has 49 lines: expected' run1.csv other.csv --out x.csv
 
 # No output takes the place of an input or of the other output; an axis that stands still has no response.
 refuse 2 'would be overwritten' run1.csv --out ./run1.csv
@@ -138,5 +165,69 @@ refuse 1 'nowhere/r.html: cannot be written' run1.csv --out x.csv --report nowhe
 awk -F, 'BEGIN{OFS=","} /^#/{print; next} !column{for(i=1;i<=NF;i++)if($i=="velocity_rad_per_s")column=i; print; next}
     {$column=0.25; print}' run1.csv >still.csv
 refuse 1 'still.csv: velocity_rad_per_s does not change' still.csv --out x.csv
+
+# One list of findings in three places: every sentence of --json stands on the screen and on the page.
+awk -F, 'BEGIN{OFS=","} /^#/{print; next} !column{for(i=1;i<=NF;i++)if($i=="velocity_rad_per_s")column=i; print; next}
+    {$column += 1.5 * sin(2 * 3.14159265 * 37.3 * $1); print}' run1.csv >wandering.csv
+"$SERVOSCOPE" frf wandering.csv --method h1 --out said.csv --report said.html >said
+"$SERVOSCOPE" frf wandering.csv --method h1 --out said.csv --json >said.json
+python3 - <<'PYTHON' || fail "a finding is not in all three places"
+import html, json, re
+found = json.load(open("said.json"))["findings"]
+page = re.sub(r"\s+", " ", html.unescape(re.sub(r"<script>.*?</script>|<[^>]*>", " ", open("said.html").read(), flags=re.S)))
+screen = open("said").read()
+assert {one["id"] for one in found} >= {"periods", "settling", "method", "response", "uncertainty", "coherence", "bias",
+                                        "oscillation", "setup"}, found
+for one in found:
+    assert one["says"] in screen, one
+    assert re.sub(r"\s+", " ", one["says"]) in page, one
+    assert one["file"] in page, one
+oscillation = [one for one in found if one["id"] == "oscillation"][0]
+assert oscillation["level"] == "warning" and abs(float(re.search(r"([\d.]+) Hz", oscillation["says"]).group(1)) - 37.3) < 0.1
+settled = [one["says"] for one in found if one["id"] == "method"][0]
+assert "it is settled" not in settled, settled
+PYTHON
+
+# A page is one file that loads nothing; measured lines are not joined, and those of a model are shown beside it.
+"$SERVOSCOPE" frf run1.csv --method parametric --delay 0.0002 --out model.csv --report model.html --quiet
+python3 - <<'PYTHON' || fail "the pages are not what they should be"
+import re
+for name in ("said.html", "model.html"):
+    page = open(name).read()
+    assert len(page) < 500000 and not re.search(r"(src|href)=|@import|url\(", page), name
+page = open("model.html").read()
+figure = page[page.index("<svg xmlns"):page.index("</figure>")]
+lines = re.findall(r'<path class="ln [^"]*" data-n="([^"]*)"', figure)
+points = re.findall(r'<path class="pt [^"]*" data-n="([^"]*)"', figure)
+assert len(lines) == 2 and lines[0].startswith("model, order"), lines # magnitude and phase, of the model only
+assert "measured" in points and not any(name == "measured" for name in lines), points
+assert "delay of 0.2 ms has been taken out of the response" in page and "pole" in page
+assert "residual over 2 std: measured less model" in figure
+PYTHON
+
+# Foreign columns are taken by their units, and what was taken is said; what nobody can tell apart is asked for by name.
+sed 's/^time_s,/t_s,/; s/,torque_Nm,/,iq_meas_A,/; s/torque_ref_Nm/iq_ref_A/; s/velocity_rad_per_s/speed_rad_s/; s/position_rad/angle_rad/' \
+    run1.csv | sed '/^#/!s/velocity_ref_rad_per_s/speed_set_rad_s/' >units.csv
+"$SERVOSCOPE" frf units.csv --out named.csv >said
+grep -q 'current_A to velocity_rad_per_s' said || fail "$(cat said)"
+grep -q 'columns were named by the units in their names: --map current_A=iq_meas_A,' said || fail "$(cat said)"
+grep -q '^# columns_named: current_A=iq_meas_A,' named.csv || fail "$(head -20 named.csv)"
+sed '/^#/!s/^t_s,iq_ref_A,iq_meas_A,/t_s,iu_A,iv_A,/' units.csv >phases.csv
+refuse 1 'phases.csv: no input column among: t_s, iu_A, iv_A, ' phases.csv --out x.csv
+refuse 1 "no column 'nonsense' to take as the output, only: time_s, torque_ref_Nm, " run1.csv --output nonsense --out x.csv
+
+# Files that are none.
+mkdir folder
+: >empty.csv
+gzip -c run1.csv >whole.csv.gz
+head -c 9000 whole.csv.gz >cut.csv.gz
+{ head -c 4000 whole.csv.gz; head -c 300 /dev/zero; tail -c 4000 whole.csv.gz; } >damaged.csv.gz
+refuse 1 'folder: is a folder: a file was expected' folder --out x.csv
+refuse 1 'empty.csv: the file is empty' empty.csv --out x.csv
+refuse 1 'cut.csv.gz:' cut.csv.gz --out x.csv
+refuse 1 'damaged.csv.gz:' damaged.csv.gz --out x.csv
+refuse 1 'nothere.csv: cannot be read: No such file' nothere.csv --out x.csv
+refuse 1 'folder: is a folder, a file name was expected' run1.csv --out x.csv --report folder
+refuse 1 '/dev/full: writing failed' run1.csv --out x.csv --report /dev/full
 
 [ "$failures" -eq 0 ]

@@ -222,7 +222,8 @@ from read import *
 assert [round(row["frequency_hz"] / 2.5) for row in read("one.csv")] == list(range(2, 60, 2))
 ' || fail "one input of two: $(cat one.csv)"
 "$SERVOSCOPE" frf pair.csv pair-2.csv --out twice.csv --quiet
-grep -qx '# realisations: 2' twice-2-1.csv || fail "two runs of two inputs"
+grep -qx '# realisations: 1' twice-2-1.csv || fail "two runs of two inputs, which are of one excitation"
+grep -qx '# runs: 2' twice-2-1.csv || fail "two runs of two inputs"
 
 # Refusals
 rm -f x*.csv

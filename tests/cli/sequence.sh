@@ -89,9 +89,10 @@ PYTHON
 grep -qx '# degrees_of_freedom: 4' frf.csv || fail "degrees of freedom: $(grep degrees frf.csv)"
 grep -qx '# segment_periods: \[3, 6, 12, 24, 48, 57\]' frf.csv || fail "$(grep segment_periods frf.csv)"
 
-# Two sequences are two realisations; a dwell settles for its manifest's 1.2 s, which is three periods, or as told.
+# Two sequences of the same tables are more periods of one realisation; a dwell settles for its manifest's 1.2 s, which is three periods, or as told.
 "$SERVOSCOPE" frf run.csv direct.csv --out both.csv --quiet
-grep -qx '# realisations: 2' both.csv || fail "two sequences are not two realisations"
+grep -qx '# realisations: 1' both.csv || fail "two sequences of the same tables: $(grep realisations both.csv)"
+grep -qx '# runs: 2' both.csv || fail "two sequences of the same tables: $(grep runs both.csv)"
 "$SERVOSCOPE" simulate --model model.json --table dwell.json --periods 4 --out dwell-run.csv --quiet
 grep -qx '# settle_periods: 3' dwell-run-1.csv || fail "$(grep settle dwell-run-1.csv)"
 "$SERVOSCOPE" simulate --model model.json --table dwell.json --periods 4 --settle 2 --out dwell-run.csv --quiet

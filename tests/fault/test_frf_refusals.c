@@ -236,6 +236,82 @@ static void test_periodic_tells_when_only_the_period_is_missing(void)
     TEST_ASSERT_NOT_NULL(strstr(error.message, "--method lpm, h1 or indirect"));
 }
 
+/// What rounding leaves of a constant or a ramp is the same in every period, and must not pass for a line.
+static void test_periodic_refuses_inputs_without_power_with_the_figure(void)
+{
+    const uint32_t bins[] = {1, 2, 3, 4, 5};
+    const struct periodic_options options = {.period_samples = length, .bins = bins, .bin_count = 5};
+    const struct periodic_options found = {.period_samples = length};
+    double *torque = run.columns[0].data;
+    for (size_t n = 0; n < run.rows; n++) {
+        torque[n] = 0.2185;
+    }
+    expect_refusal(&options, "torque_Nm is 0.2185 in all 720 rows");
+    torque[5] = nextafter(torque[5], 1.0);
+    expect_refusal(&options, "torque_Nm has no power on any of 5 lines: the strongest, ");
+    expect_refusal(&found, "no line of torque_Nm repeats");
+    for (size_t n = 0; n < run.rows; n++) {
+        torque[n] = 17.0 + 1e-3 * (double)n;
+    }
+    expect_refusal(&options, "torque_Nm has no power on any of 5 lines: the strongest, ");
+    expect_refusal(&options, "and rounding alone may leave ");
+    expect_refusal(&found, "no line of torque_Nm repeats");
+    expect_refusal(&(struct periodic_options){.output = "torque_Nm"}, "input and output are both torque_Nm");
+    struct arbitrary arbitrary;
+    TEST_ASSERT_EQUAL_INT(error_refused, arbitrary_cut(&run, &(struct arbitrary_options){0}, &arbitrary, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "torque_Nm is a straight line from 17 to 17.719"),
+                                 error.message);
+}
+
+/// A line that nobody excites is not valid, though the others are.
+static void test_methods_give_no_line_that_is_rounding(void)
+{
+    const uint32_t bins[] = {1, 2, 3, 4, 5, 20};
+    const struct periodic_options options = {.period_samples = length, .bins = bins, .bin_count = 6};
+    for (const struct estimate_method *method = estimate_methods; method->name; method++) {
+        struct frf frf;
+        if (strcmp(method->name, "parametric") == 0) {
+            continue; // its lines are those of the model
+        }
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, periodic_cut(&run, &options, &recording, &error), error.message);
+        recording.reference = run.columns[1].name;
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, method->estimate(&recording, NULL, &frf, &error), error.message);
+        TEST_ASSERT_TRUE_MESSAGE(frf.valid[4], method->name);
+        TEST_ASSERT_FALSE_MESSAGE(frf.valid[5], method->name);
+        frf_free(&frf);
+        periodic_free(&recording);
+    }
+}
+
+/// Whatever stands in lost samples: the same period, lines and response.
+static void test_periodic_ignores_what_stands_in_lost_samples(void)
+{
+    struct frf responses[2];
+    double *valid = run_add_column(&run, "valid");
+    for (size_t n = 0; n < run.rows; n++) {
+        valid[n] = n < 2 * length || n > 2 * length + 3;
+    }
+    for (int garbage = 0; garbage < 2; garbage++) {
+        for (size_t n = 2 * length; n < 2 * length + 4 && garbage; n++) {
+            run.columns[0].data[n] = 1e30;
+            run.columns[1].data[n] = -1e25;
+        }
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, periodic_cut(&run, &(struct periodic_options){0}, &recording, &error),
+                                      error.message);
+        TEST_ASSERT_EQUAL_size_t(length, recording.period_samples);
+        TEST_ASSERT_EQUAL_size_t(lines, recording.bin_count);
+        TEST_ASSERT_EQUAL_size_t(1, recording.lost);
+        TEST_ASSERT_EQUAL_INT(0, estimate_methods[0].estimate(&recording, NULL, &responses[garbage], &error));
+        periodic_free(&recording);
+    }
+    for (size_t line = 0; line < lines; line++) {
+        TEST_ASSERT_EQUAL_DOUBLE(responses[0].real[line], responses[1].real[line]);
+        TEST_ASSERT_EQUAL_DOUBLE(responses[0].std[line], responses[1].std[line]);
+    }
+    frf_free(&responses[0]);
+    frf_free(&responses[1]);
+}
+
 static void test_average_refuses_other_lines_and_names(void)
 {
     struct frf both[2];
@@ -276,6 +352,9 @@ int main(void)
     RUN_TEST(test_indirect_refuses_a_reference_that_is_none);
     RUN_TEST(test_methods_without_periods_refuse_too_little);
     RUN_TEST(test_periodic_tells_when_only_the_period_is_missing);
+    RUN_TEST(test_periodic_refuses_inputs_without_power_with_the_figure);
+    RUN_TEST(test_methods_give_no_line_that_is_rounding);
+    RUN_TEST(test_periodic_ignores_what_stands_in_lost_samples);
     RUN_TEST(test_average_refuses_other_lines_and_names);
     return UNITY_END();
 }

@@ -6,7 +6,7 @@
 #include <string.h>
 
 static struct run run;
-static double level[] = {0.3, 0.01};
+static double level[8];
 static size_t numbers[] = {0, 1, 2, 3, 4, 5, 6, 7};
 static struct periodic recording;
 static struct estimate_advice advice;
@@ -14,6 +14,9 @@ static struct estimate_advice advice;
 void setUp(void)
 {
     run = (struct run){0};
+    for (size_t p = 0; p < sizeof level / sizeof level[0]; p++) {
+        level[p] = p == 0 ? 0.3 : 0.01;
+    }
     recording = (struct periodic){.run = &run,
                                   .input = "torque_Nm",
                                   .output = "velocity_rad_per_s",
@@ -48,6 +51,17 @@ static void test_advise_mean_where_the_recording_gives_up_its_settling_periods(v
     recording.transient.periods = 2;
     estimate_advise(&recording, &advice);
     expect("mean", "settled after the 2 of 8 periods");
+}
+
+/* A limit cycle or a disturbance makes periods differ from each other, early and late alike: nothing is settled. */
+static void test_advise_does_not_call_restless_periods_settled(void)
+{
+    for (size_t p = 0; p < sizeof level / sizeof level[0]; p++) {
+        level[p] = 0.4;
+    }
+    estimate_advise(&recording, &advice);
+    expect("mean", "no transient stands out of what differs from period to period anyway (0.4 of the output)");
+    TEST_ASSERT_NULL(strstr(advice.sentence, "it is settled"));
 }
 
 static void test_advise_lpm_for_a_transient(void)
@@ -112,6 +126,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_advise_mean_for_a_settled_recording);
     RUN_TEST(test_advise_mean_where_the_recording_gives_up_its_settling_periods);
+    RUN_TEST(test_advise_does_not_call_restless_periods_settled);
     RUN_TEST(test_advise_lpm_for_a_transient);
     RUN_TEST(test_advise_mean_where_the_transient_costs_little);
     RUN_TEST(test_advise_lpm_for_few_periods);

@@ -4,12 +4,17 @@
 #include "unity.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
+#include <sys/resource.h>
 
 static const double two_pi = 6.283185307179586476925;
 
 /// Relative to the largest value: rounding of a transform, which for a large prime is a sum of that many terms.
 static const double rounding = 2e-13;
+
+/// Relative to the root mean square of the lines, the defining sum in long double: some 3e-15 are measured by chirp.
+static const double rounding_of_chirp = 1e-13;
 
 enum { longest = 2500 };
 
@@ -33,8 +38,8 @@ static void plan_for(size_t length)
 }
 
 /// Powers of two and other primes, primes themselves, and lengths as recordings have them.
-static const size_t lengths[] = {1,  2,  3,  4,  5,   6,   7,   8,   11,   13,   16,   17,
-                                 25, 49, 60, 97, 128, 210, 343, 499, 1000, 1009, 1024, 2500};
+static const size_t lengths[] = {1,  2,  3,  4,   5,   6,   7,   8,   11,  13,   16,   17,   25,   32,   36,   49,
+                                 60, 64, 97, 128, 208, 210, 343, 499, 625, 1000, 1009, 1024, 1155, 2044, 2457, 2500};
 enum { length_count = sizeof lengths / sizeof lengths[0] };
 
 static void fill(size_t n)
@@ -66,6 +71,74 @@ static void test_fft_forward_is_the_defining_sum(void)
         }
     }
 }
+
+/// Largest error of some lines over the root mean square of all.
+static double error_of_transform(size_t n, const double *x, const double *lines)
+{
+    const long double turn = 6.283185307179586476925286766559L;
+    double error = 0.0, power = 0.0;
+    for (size_t k = 0; k < 2 * n; k++)
+        power += lines[k] * lines[k];
+    for (size_t k = 0; k < n; k += n / 11 + 1) {
+        long double re = 0.0L, im = 0.0L;
+        for (size_t i = 0; i < n; i++) {
+            long double angle = -turn * (long double)((uint64_t)k * i % n) / (long double)n;
+            re += x[2 * i] * cosl(angle) - x[2 * i + 1] * sinl(angle);
+            im += x[2 * i] * sinl(angle) + x[2 * i + 1] * cosl(angle);
+        }
+        error = fmax(error, hypot(lines[2 * k] - (double)re, lines[2 * k + 1] - (double)im));
+    }
+    return error / sqrt(power / (double)n);
+}
+
+/// Primes, and products of large ones with small ones, two of which have lanes.
+static void test_fft_of_lengths_with_a_large_prime_factor_is_exact(void)
+{
+    static const size_t large[] = {2003, 10007, 4 * 2503, 2 * 5003, 64 * 251, 4 * 113 * 25, 3 * 3323, 97 * 101, 131071};
+    for (size_t l = 0; l < sizeof large / sizeof large[0]; l++) {
+        size_t n = large[l];
+        double *x = malloc(4 * n * sizeof *x), *lines = x + 2 * n;
+        TEST_ASSERT_NOT_NULL(x);
+        for (size_t i = 0; i < 2 * n; i++)
+            x[i] = sin(1.3 * (double)i) + (double)(i * i % 101) / 101.0 - 0.5;
+        plan_for(n);
+        fft_forward(plan, x, lines);
+        double forward = error_of_transform(n, x, lines);
+        double back_error = 0.0;
+        double *again = malloc(2 * n * sizeof *again);
+        TEST_ASSERT_NOT_NULL(again);
+        fft_inverse(plan, lines, again);
+        for (size_t i = 0; i < 2 * n; i++)
+            back_error = fmax(back_error, fabs(again[i] / (double)n - x[i]));
+        free(again);
+        free(x);
+        TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(rounding_of_chirp, 0.0, forward, "forward");
+        TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(rounding_of_chirp, 0.0, back_error, "inverse");
+    }
+}
+
+static void test_fft_plan_of_an_impossible_length_is_null(void)
+{
+    TEST_ASSERT_NULL(fft_plan_create((size_t)1 << 33));
+    TEST_ASSERT_NULL(fft_plan_create(SIZE_MAX));
+}
+
+#ifndef __SANITIZE_ADDRESS__ /* whose own memory would run short, too */
+/// A smooth length with lanes, a prime and a smooth length without.
+static void test_fft_plan_is_null_where_memory_is_short(void)
+{
+    static const size_t large[] = {1 << 20, 1000003, 531441};
+    for (size_t l = 0; l < sizeof large / sizeof large[0]; l++) {
+        struct rlimit before, none = {.rlim_cur = 1 << 20};
+        TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_AS, &before));
+        none.rlim_max = before.rlim_max;
+        TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_AS, &none));
+        struct fft_plan *refused = fft_plan_create(large[l]);
+        TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_AS, &before));
+        TEST_ASSERT_NULL(refused);
+    }
+}
+#endif
 
 static void test_fft_inverse_of_forward_is_the_input_times_the_length(void)
 {
@@ -143,7 +216,7 @@ static void test_fft_of_a_pair_is_that_of_both_scaled_signals(void)
             in[2 * i + 1] *= -0.5;
         }
         fft_forward(plan, in, out);
-        TEST_ASSERT_TRUE(fft_forward_pair(plan, first, 2.0, second, -0.5, back));
+        fft_forward_pair(plan, first, 2.0, second, -0.5, back);
         TEST_ASSERT_EQUAL_MEMORY(out, back, 2 * n * sizeof out[0]);
         free(first);
     }
@@ -186,6 +259,11 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_fft_forward_is_the_defining_sum);
+    RUN_TEST(test_fft_of_lengths_with_a_large_prime_factor_is_exact);
+    RUN_TEST(test_fft_plan_of_an_impossible_length_is_null);
+#ifndef __SANITIZE_ADDRESS__
+    RUN_TEST(test_fft_plan_is_null_where_memory_is_short);
+#endif
     RUN_TEST(test_fft_inverse_of_forward_is_the_input_times_the_length);
     RUN_TEST(test_fft_keeps_the_energy);
     RUN_TEST(test_fft_of_a_late_pulse_turns_by_its_delay);

@@ -89,8 +89,9 @@ static void check_honesty(const char *name, estimator *method, double gain, uint
     }
     printf("%s, seed %u: predicted/empirical variance %.3f, coverage %.2f %% of %.0f\n", name, (unsigned)seed,
            predicted / empirical, 100.0 * covered / count, count);
-    /* 3600 values, neighbours share a Hann window: 3 %; segments of 64 samples leak a per cent. */
-    TEST_ASSERT_DOUBLE_WITHIN(0.10, 1.0, predicted / empirical);
+    /* 3600 values, neighbours share a Hann window: 3 %; segments of 64 samples leak a per cent; one line in 50 looks
+     * moved by chance and has its std enlarged, which the mean of squares shows by 5 to 12 %. */
+    TEST_ASSERT_DOUBLE_WITHIN(0.10, 1.05, predicted / empirical);
     TEST_ASSERT_DOUBLE_WITHIN(0.015, 0.95, covered / count);
 }
 
@@ -102,6 +103,83 @@ static void test_h1_std_is_right_in_open_loop(void)
 static void test_indirect_std_is_right_in_closed_loop(void)
 {
     check_honesty("indirect", frf_indirect_estimate_arbitrary, 0.7, 2);
+}
+
+enum { long_rows = 20000, long_segment = 2000, resonance_runs = 20, lines_around = 4 };
+
+/// Velocity of a mass on a spring, 60 Hz and damping .002, with a weak controller around it: in the loop .0053, 0.6 Hz
+/// wide, where segments have lines 0.5 Hz apart.
+struct resonance {
+    double a1, a2, b, gain;
+};
+
+static const struct resonance resonance = {-1.85825, 0.998493, 0.05, 0.05};
+
+static void simulate_resonance(struct run *io_run, double noise, struct random *random)
+{
+    double u[3] = {0.0};
+    double x[3] = {0.0};
+    for (int n = -2000; n < long_rows; n++) {
+        const double reference = random_normal(random);
+        x[0] = resonance.b * (u[1] - u[2]) - resonance.a1 * x[1] - resonance.a2 * x[2];
+        const double y = x[0] + noise * random_normal(random);
+        u[0] = resonance.gain * (reference - y);
+        if (n >= 0) {
+            io_run->columns[0].data[n] = u[0];
+            io_run->columns[1].data[n] = y;
+            io_run->columns[2].data[n] = reference;
+        }
+        x[2] = x[1];
+        x[1] = x[0];
+        u[2] = u[1];
+        u[1] = u[0];
+    }
+}
+
+static double complex true_resonance(double frequency_hz)
+{
+    const double complex back = cexp(-I * two_pi * frequency_hz / 1000.0);
+    return resonance.b * back * (1.0 - back) / (1.0 + resonance.a1 * back + resonance.a2 * back * back);
+}
+
+/// Segments do not resolve the closed loop's pole: every one of them moves the lines around it alike. Of 8 lines around
+/// 60 Hz in 20 runs, 95 % regions held 72 % before std knew that.
+static void test_indirect_std_holds_near_a_pole_that_segments_do_not_resolve(void)
+{
+    const struct estimate_options options = {.segment_samples = long_segment};
+    struct random random;
+    double covered = 0.0;
+    double count = 0.0;
+    int warned = 0;
+    run.path = NULL;
+    run_free(&run);
+    static char path[] = "made";
+    run = (struct run){.path = path, .sample_rate_hz = 1000.0, .rows = long_rows};
+    TEST_ASSERT_TRUE(run_add_column(&run, "torque_Nm") && run_add_column(&run, "velocity_rad_per_s") &&
+                     run_add_column(&run, "velocity_ref_rad_per_s"));
+    random_seed(&random, 11);
+    for (int r = 0; r < resonance_runs; r++) {
+        struct arbitrary recording;
+        struct error error = {0};
+        struct frf frf;
+        simulate_resonance(&run, 0.01, &random);
+        TEST_ASSERT_EQUAL_INT(0, arbitrary_cut(&run, &(struct arbitrary_options){0}, &recording, &error));
+        TEST_ASSERT_EQUAL_INT(0, frf_indirect_estimate_arbitrary(&recording, &options, &frf, &error));
+        const double factor = circle_confidence_factor(0.95, frf.degrees_of_freedom / 2.0);
+        for (size_t k = 0; k < frf.count; k++) {
+            if (fabs(frf.frequency_hz[k] - 60.0) < 0.5 * lines_around && frf.valid[k]) {
+                const double complex error_of = CMPLX(frf.real[k], frf.imag[k]) - true_resonance(frf.frequency_hz[k]);
+                covered += cabs(error_of) <= factor * frf.std[k];
+                count += 1.0;
+            }
+        }
+        warned += estimate_key(&frf, "warning_resolution")[0] != '\0';
+        frf_free(&frf);
+    }
+    printf("indirect, seed 11: coverage %.1f %% of %.0f lines around the pole, %d of %d runs warned\n",
+           100.0 * covered / count, count, warned, resonance_runs);
+    TEST_ASSERT_TRUE(covered / count > 0.88);
+    TEST_ASSERT_TRUE(warned > resonance_runs / 5);
 }
 
 /// Noise of half the output's power: coherence 1/2, whatever the line.
@@ -207,6 +285,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_h1_std_is_right_in_open_loop);
     RUN_TEST(test_indirect_std_is_right_in_closed_loop);
+    RUN_TEST(test_indirect_std_holds_near_a_pole_that_segments_do_not_resolve);
     RUN_TEST(test_h1_gives_the_coherence);
     RUN_TEST(test_h1_warns_of_the_loop_that_the_recording_shows);
     RUN_TEST(test_segments_leave_out_what_was_lost);

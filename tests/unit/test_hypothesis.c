@@ -51,7 +51,9 @@ static void scan_values(int effect, double *out)
                                     .duration_s = 20.0,
                                     .frequency_max_hz = 100.0,
                                     .linear = given.linear};
-    TEST_ASSERT_TRUE(sim_effects[effect]->scan(&given, &coverage, 0, out));
+    struct sim_model current;
+    hypothesis_model(&hypothesis, NULL, &current);
+    TEST_ASSERT_TRUE(sim_effects[effect]->scan(&current, &coverage, 0, out));
 }
 
 static void assert_same_model(const struct sim_model *expected, const struct sim_model *model)
@@ -146,7 +148,11 @@ static void test_hypothesis_naming_starts_at_the_values_and_opens_the_box(void)
             setUp();
             given.linear = linear;
             hypothesis_init(&hypothesis, &given, false, true);
-            TEST_ASSERT_TRUE_MESSAGE(hypothesis_may_name(&hypothesis, e), effect->id);
+            // What is noticed in the rows is no hypothesis, and a belt's effects take two masses.
+            bool expected = !effect->notice && (!effect->applies || effect->applies(&given));
+            TEST_ASSERT_EQUAL_INT_MESSAGE(expected, hypothesis_may_name(&hypothesis, e), effect->id);
+            if (!expected)
+                continue;
             double values[sim_effect_parameters_max] = {0}, got[sim_effect_parameters_max] = {0};
             scan_values(e, values);
             hypothesis_name(&hypothesis, e, values);
@@ -180,6 +186,8 @@ static void test_hypothesis_boxes_of_named_effects_end_at_or_within_the_bounds_o
             setUp();
             given.linear = linear;
             hypothesis_init(&hypothesis, &given, false, true);
+            if (!hypothesis_may_name(&hypothesis, e))
+                continue;
             double values[sim_effect_parameters_max] = {0};
             scan_values(e, values);
             hypothesis_name(&hypothesis, e, values);
@@ -195,7 +203,7 @@ static void test_hypothesis_boxes_of_named_effects_end_at_or_within_the_bounds_o
                 } else if (c->scale == coordinate_logarithmic) {
                     TEST_ASSERT_TRUE(c->unit * exp(c->lower) >= low * (1.0 - rounding));
                     TEST_ASSERT_TRUE(c->unit * exp(c->upper) <= high * (1.0 + rounding));
-                    TEST_ASSERT_TRUE(c->upper > 1.0 && c->lower < -1.0);
+                    TEST_ASSERT_TRUE_MESSAGE(c->upper > 1.0 || c->lower < -1.0, sim_effects[e]->id);
                 } else if (c->scale == coordinate_cosine) {
                     TEST_ASSERT_DOUBLE_WITHIN(rounding * high, high, c->unit * c->upper);
                 }
@@ -207,6 +215,8 @@ static void test_hypothesis_unnaming_gives_back_what_was_before(void)
 {
     for (int e = 0; sim_effects[e]; e++) {
         struct hypothesis before = hypothesis;
+        if (!hypothesis_may_name(&hypothesis, e))
+            continue;
         double values[sim_effect_parameters_max] = {0};
         scan_values(e, values);
         hypothesis_name(&hypothesis, e, values);
@@ -231,8 +241,12 @@ static void test_hypothesis_effects_come_and_go_in_any_order_and_keep_the_others
             setUp();
             double values[sim_effect_parameters_max] = {0}, before[sim_effect_parameters_max],
                    after[sim_effect_parameters_max];
+            if (!hypothesis_may_name(&hypothesis, a))
+                continue;
             scan_values(a, values);
             hypothesis_name(&hypothesis, a, values);
+            if (!hypothesis_may_name(&hypothesis, b))
+                continue;
             scan_values(b, values);
             hypothesis_name(&hypothesis, b, values);
             assert_sound();
@@ -242,6 +256,11 @@ static void test_hypothesis_effects_come_and_go_in_any_order_and_keep_the_others
             hypothesis_parameters(&hypothesis, b, NULL, before, NULL);
             hypothesis_unname(&hypothesis, a);
             assert_sound();
+            if (!hypothesis.named[b]) { // it had nothing to act on without the first
+                TEST_ASSERT_NOT_NULL_MESSAGE(sim_effects[b]->applies, sim_effects[b]->id);
+                TEST_ASSERT_FALSE_MESSAGE(sim_effects[b]->applies(&given), sim_effects[b]->id);
+                continue;
+            }
             hypothesis_parameters(&hypothesis, b, NULL, after, NULL);
             for (size_t i = 0; i < sim_effects[b]->parameter_count; i++)
                 TEST_ASSERT_EQUAL_DOUBLE_MESSAGE(before[i], after[i], sim_effects[b]->id);

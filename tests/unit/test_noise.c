@@ -124,7 +124,7 @@ static void prepare(size_t periods, bool with_reference)
     TEST_ASSERT_TRUE(evidence_estimate_noise(&evidence, &model));
     whitened = malloc(evidence.values * sizeof *whitened);
     TEST_ASSERT_NOT_NULL(whitened);
-    evidence_residual(&evidence, &model, whitened);
+    evidence_residual(&evidence, &model, whitened, NULL);
 }
 
 /// Sum of squares of one channel's values over all bins but the constant part, against chi-square; the noise was
@@ -303,7 +303,7 @@ static void test_noise_of_a_run_without_periods_comes_from_its_own_residual(void
     TEST_ASSERT_TRUE(evidence_estimate_noise(&evidence, &model));
     whitened = malloc(evidence.values * sizeof *whitened);
     TEST_ASSERT_NOT_NULL(whitened);
-    evidence_residual(&evidence, &model, whitened);
+    evidence_residual(&evidence, &model, whitened, NULL);
     double sums[2] = {0.0, 0.0};
     for (size_t i = 1; i < evidence.values; i++) {
         size_t channel;

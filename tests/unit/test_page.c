@@ -748,6 +748,28 @@ static void test_page_end_reports_a_full_disk(void)
     }
 }
 
+/* Each span goes from its upper to its lower end; one that is not known is left out, one without end is cut off. */
+static void test_figure_spans_reach_from_low_to_high(void)
+{
+    const double x[] = {0.0, 1.0, 2.0};
+    const double low[] = {1.0, NAN, 3.0};
+    const double high[] = {2.0, 2.0, INFINITY};
+    struct figure_panel *panel = figure_add_panel(&figure, "value", axis_linear);
+    panel->low = 0.0;
+    panel->high = 4.0;
+    figure_add_spans(panel, "", 3, x, low, high);
+    const char *svg = drawn();
+    const struct frame frame = read_frame(svg);
+    read_path(svg, "sp");
+    TEST_ASSERT_EQUAL(2, trace.moves);
+    TEST_ASSERT_EQUAL(4, trace.count);
+    const double expected[] = {2.0, 1.0, 4.0, 3.0};
+    for (size_t n = 0; n < 4; n++) {
+        TEST_ASSERT_DOUBLE_WITHIN(2.0 * written_px, to_y(frame, expected[n]), trace.at[n].y);
+    }
+    assert_inside(frame);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -780,5 +802,6 @@ int main(void)
     RUN_TEST(test_page_writes_long_paragraphs_whole);
     RUN_TEST(test_page_empty_table_and_list_say_so);
     RUN_TEST(test_page_end_reports_a_full_disk);
+    RUN_TEST(test_figure_spans_reach_from_low_to_high);
     return UNITY_END();
 }

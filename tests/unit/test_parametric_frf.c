@@ -95,8 +95,8 @@ static void test_parametric_method_beats_the_mean_and_knows_how_sure_it_is(void)
     // All lines share the same few parameters: a mean square of about five independent numbers.
     TEST_ASSERT_TRUE(squares < 5.0);
     TEST_ASSERT_TRUE(gained < 0.6);
-    TEST_ASSERT_EQUAL_STRING("2 over 2 in 1/z", estimate_key(&frf, "parametric_order"));
-    TEST_ASSERT_NOT_NULL(strstr(estimate_key(&frf, "parametric_why"), "order 2 over 2"));
+    TEST_ASSERT_EQUAL_STRING("1 over 2 in 1/z, 1 sample late", estimate_key(&frf, "parametric_order"));
+    TEST_ASSERT_NOT_NULL(strstr(estimate_key(&frf, "parametric_why"), "order 1 over 2"));
     TEST_ASSERT_NOT_NULL(strstr(estimate_key(&frf, "parametric_cost"), "expected"));
     TEST_ASSERT_TRUE(strtod(estimate_key(&frf, "parametric_poles"), NULL) > 49.0);
     frf_free(&frf);
@@ -141,11 +141,37 @@ static void test_parametric_method_covers_what_no_order_explains(void)
     frf_free(&frf);
 }
 
-static void test_parametric_method_refuses_three_periods(void)
+/// Two periods say little of one line's noise, but lines that scatter alike say enough together.
+static void test_parametric_method_takes_two_periods_of_even_noise(void)
 {
     struct frf frf;
     struct error error = {0};
+    double squares = 0.0;
     fill(0.05, 1);
+    recording.used = 2;
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, frf_parametric_estimate(&recording, NULL, &frf, &error), error.message);
+    for (size_t k = 0; k < lines; k++) {
+        double share = cabs(value(&frf, k) - plant((double)bins[k])) / frf.std[k];
+        squares += share * share / lines;
+    }
+    TEST_ASSERT_TRUE(squares < 5.0);
+    TEST_ASSERT_EQUAL_STRING("21", estimate_key(&frf, "parametric_pooled_lines"));
+    frf_free(&frf);
+}
+
+/// Neighbours that scatter by very different amounts are not taken together, and then three periods are too few.
+static void test_parametric_method_refuses_three_periods_of_uneven_noise(void)
+{
+    struct frf frf;
+    struct error error = {0};
+    struct random random;
+    fill(0.001, 1);
+    random_seed(&random, 4);
+    for (size_t i = 0; i < periods * lines; i++) {
+        double size = i % lines % 2 ? 0.1 : 0.0;
+        double real = random_normal(&random);
+        output[i] += size * (real + I * random_normal(&random));
+    }
     recording.used = 3;
     TEST_ASSERT_EQUAL_INT(error_refused, frf_parametric_estimate(&recording, NULL, &frf, &error));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "4 periods"), error.message);
@@ -198,13 +224,58 @@ static void test_parametric_fits_a_response_file_and_writes_json(void)
     frf_free(&frf);
 }
 
+/// A response without spectra, such as that of a sequence, keeps its keys and gets the model's lines; noise_std is what
+/// the noise alone does to it.
+static void test_parametric_fits_what_several_runs_give_together(void)
+{
+    struct frf measured;
+    struct frf frf;
+    struct random random;
+    static struct parametric_outcome outcome;
+    const struct estimate_options options = {.order = estimate_order_auto, .parametric = &outcome};
+    struct error error = {0};
+    TEST_ASSERT_EQUAL_INT(0, frf_alloc(&measured, lines, NULL));
+    random_seed(&random, 6);
+    for (size_t k = 0; k < lines; k++) {
+        double real = random_normal(&random);
+        double complex response = plant((double)bins[k]) + 0.02 * sqrt(0.5) * (real + I * random_normal(&random));
+        measured.frequency_hz[k] = (double)bins[k];
+        measured.real[k] = creal(response);
+        measured.imag[k] = cimag(response);
+        measured.std[k] = 0.02;
+        measured.noise_std[k] = 0.01;
+        measured.valid[k] = k != 7;
+    }
+    measured.degrees_of_freedom = 8.0;
+    TEST_ASSERT_TRUE(frf_set_text(&measured.input, "torque_Nm") && frf_set_text(&measured.output, "position_rad") &&
+                     frf_set_text(&measured.units, "rad/Nm") && frf_set_text(&measured.method, "mean"));
+    TEST_ASSERT_EQUAL_INT(error_refused, frf_parametric_fit(&measured, "seq.json", &options, &frf, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "sample rate"), error.message);
+    TEST_ASSERT_TRUE(estimate_set_key(&measured, "sample_rate_hz", "%g", sample_rate_hz) &&
+                     estimate_set_key(&measured, "segments", "3"));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, frf_parametric_fit(&measured, "seq.json", &options, &frf, &error), error.message);
+    TEST_ASSERT_EQUAL_STRING("parametric", frf.method);
+    TEST_ASSERT_EQUAL_STRING("3", estimate_key(&frf, "segments"));
+    TEST_ASSERT_TRUE(outcome.made);
+    TEST_ASSERT_EQUAL_size_t(2, outcome.model.structure.denominator_order);
+    for (size_t k = 0; k < lines; k++) {
+        TEST_ASSERT_TRUE(frf.valid[k]);
+        TEST_ASSERT_DOUBLE_WITHIN(5.0 * frf.std[k], 0.0, cabs(value(&frf, k) - plant((double)bins[k])));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-3 * frf.std[k], 0.5 * frf.std[k], frf.noise_std[k]);
+    }
+    frf_free(&measured);
+    frf_free(&frf);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_parametric_method_beats_the_mean_and_knows_how_sure_it_is);
     RUN_TEST(test_parametric_method_says_that_nothing_scatters);
     RUN_TEST(test_parametric_method_covers_what_no_order_explains);
-    RUN_TEST(test_parametric_method_refuses_three_periods);
+    RUN_TEST(test_parametric_method_takes_two_periods_of_even_noise);
+    RUN_TEST(test_parametric_method_refuses_three_periods_of_uneven_noise);
+    RUN_TEST(test_parametric_fits_what_several_runs_give_together);
     RUN_TEST(test_parametric_fits_a_response_file_and_writes_json);
     return UNITY_END();
 }

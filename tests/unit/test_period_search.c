@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/period_search.h"
-#include "lab/estimate/spectra.h"
 #include "lab/numeric/statistics.h"
 
 #include "unity.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 static const double two_pi = 6.283185307179586476925;
@@ -77,40 +77,40 @@ static void test_period_search_refuses_noise_and_short_signals(void)
     free(signal);
 }
 
-static void test_period_search_finds_excited_bins_only(void)
+/// A period one sample off, a part of one, or any other is refuted with what the signal repeats after; a multiple, the
+/// true one, and one that a clock moved are not.
+static void test_period_check_refutes_other_periods_only(void)
 {
-    enum { length = 500, periods = 8, all = length / 2 + 1 };
-    double *signal = multisine(length * periods, length, 0.3, 5);
-    double complex *spectra = malloc(periods * all * sizeof *spectra);
-    uint32_t bins[all];
-    TEST_ASSERT_TRUE(spectra_transform_all(signal, length, periods, spectra));
-    size_t count;
-    TEST_ASSERT_TRUE(period_search_bins(spectra, periods, all, all, bins, &count));
-    TEST_ASSERT_EQUAL_size_t(15, count);
-    for (uint32_t b = 0; b < count; b++) {
-        TEST_ASSERT_EQUAL_UINT32(3 + 4 * b, bins[b]);
+    static const struct {
+        double period;
+        size_t given;
+        bool refuted;
+    } cases[] = {{500.0, 500, false},  {500.0, 1000, false}, {500.0, 499, true},   {500.0, 501, true},
+                 {500.0, 250, true},   {500.0, 480, true},   {500.0, 750, true},   {500.3, 500, false},
+                 {500.3, 1001, false}, {501.0, 500, true},   {500.0, 1500, false}, {500.0, 1499, true}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        for (uint64_t seed = 1; seed <= 5; seed++) {
+            char text[80];
+            struct period_check check;
+            double *signal = multisine(5500, cases[i].period, seed % 2 ? 0.05 : 0.5, seed);
+            period_search_check(signal, 5500, cases[i].given, &check);
+            snprintf(text, sizeof text, "period %g, given %zu, seed %d, correlation %g of %g", cases[i].period,
+                     cases[i].given, (int)seed, check.correlation, check.found.correlation);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(cases[i].refuted, check.refuted, text);
+            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.05, cases[i].period, check.found.exact_samples, text);
+            free(signal);
+        }
     }
-    free(signal);
-    free(spectra);
 }
 
-/// In a loop the lines between the excited ones repeat as well, and are far above the noise.
-static void test_period_search_tells_distortion_from_excitation(void)
+/// Where nothing repeats nothing is refuted.
+static void test_period_check_of_noise_refutes_nothing(void)
 {
-    enum { length = 500, periods = 8, all = length / 2 + 1 };
-    double *signal = multisine(length * periods, length, 0.001, 6);
-    double complex *spectra = malloc(periods * all * sizeof *spectra);
-    uint32_t bins[all];
-    size_t count;
-    for (size_t n = 0; n < length * periods; n++) {
-        signal[n] += 0.004 * signal[n] * signal[n] + 0.1 * cos(two_pi * 5.0 * (double)n / length);
-    }
-    TEST_ASSERT_TRUE(spectra_transform_all(signal, length, periods, spectra));
-    TEST_ASSERT_TRUE(period_search_bins(spectra, periods, all, all, bins, &count));
-    TEST_ASSERT_EQUAL_size_t(15, count);
-    TEST_ASSERT_EQUAL_UINT32(7, bins[1]);
+    double *signal = random_signal(5000, 9);
+    struct period_check check;
+    TEST_ASSERT_EQUAL_INT(period_search_err_none, period_search_check(signal, 5000, 500, &check));
+    TEST_ASSERT_FALSE(check.refuted);
     free(signal);
-    free(spectra);
 }
 
 int main(void)
@@ -119,7 +119,7 @@ int main(void)
     RUN_TEST(test_period_search_finds_whole_period_in_noise);
     RUN_TEST(test_period_search_refuses_fraction_with_figure);
     RUN_TEST(test_period_search_refuses_noise_and_short_signals);
-    RUN_TEST(test_period_search_finds_excited_bins_only);
-    RUN_TEST(test_period_search_tells_distortion_from_excitation);
+    RUN_TEST(test_period_check_refutes_other_periods_only);
+    RUN_TEST(test_period_check_of_noise_refutes_nothing);
     return UNITY_END();
 }

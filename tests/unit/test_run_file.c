@@ -132,7 +132,7 @@ static void test_run_read_names_file_line_column_and_value_of_a_bad_number(void)
 
 static void test_run_read_refuses_what_is_no_table(void)
 {
-    refuse("", "run.csv:1: the file ends without a row of column names");
+    refuse("", "run.csv: the file is empty: a row of column names was expected");
     refuse("# sample_rate_hz: 1\n", "run.csv:2: the file ends without a row of column names");
     refuse("torque_Nm\n", "run.csv:2: the file ends without a row of numbers");
     refuse("0,1\n2,3\n", "run.csv:1: '0' is a number, the row of column names was expected first");

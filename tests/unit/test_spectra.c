@@ -58,14 +58,32 @@ static void check_length(size_t length, size_t bin_count)
     free(spectra);
 }
 
-static void test_spectra_equal_definition_by_sums_and_by_fft(void)
+static void test_spectra_equal_definition_for_many_and_few_bins(void)
 {
-    TEST_ASSERT_FALSE(spectra_prefers_fft(2003, 200));
     check_length(2003, 200);
-    TEST_ASSERT_FALSE(spectra_prefers_fft(2000, 9));
     check_length(2000, 9);
-    TEST_ASSERT_TRUE(spectra_prefers_fft(2000, 200));
     check_length(2000, 200);
+    check_length(1250, 1);
+}
+
+/// A sine that is zero at every seventh sample must not be taken for a small signal.
+static void test_spectra_keep_a_signal_beside_a_sine_with_many_zeros(void)
+{
+    enum { length = 1400, bin = 100 };
+    double *noise = random_signal(length, 8);
+    double *sine = malloc(length * sizeof *sine);
+    const uint32_t bins[] = {3, bin};
+    double complex spectra[2][2];
+    for (size_t n = 0; n < length; n++) {
+        sine[n] = sin(two_pi * (double)(bin * n % length) / length);
+    }
+    TEST_ASSERT_TRUE(spectra_transform_both(sine, noise, length, 1, bins, 2, spectra[0], spectra[1]));
+    for (size_t b = 0; b < 2; b++) {
+        TEST_ASSERT_TRUE(cabs(spectra[0][b] - by_definition(sine, length, bins[b])) < rounding);
+        TEST_ASSERT_TRUE(cabs(spectra[1][b] - by_definition(noise, length, bins[b])) < rounding);
+    }
+    free(noise);
+    free(sine);
 }
 
 static void test_spectra_all_bins_equal_chosen_ones(void)
@@ -101,7 +119,6 @@ static void test_spectra_of_both_keep_a_small_signal_beside_a_large_one(void)
         large[n] *= 3e9;
         small[n] *= 2e-9;
     }
-    TEST_ASSERT_TRUE(spectra_prefers_fft(length, bin_count));
     TEST_ASSERT_TRUE(spectra_transform_both(large, small, length, periods, bins, bin_count, spectra[0], spectra[1]));
     for (size_t i = 0; i < periods * bin_count; i++) {
         size_t start = i / bin_count * length;
@@ -162,7 +179,8 @@ static void test_stretch_near_equals_the_whole_transform(void)
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_spectra_equal_definition_by_sums_and_by_fft);
+    RUN_TEST(test_spectra_equal_definition_for_many_and_few_bins);
+    RUN_TEST(test_spectra_keep_a_signal_beside_a_sine_with_many_zeros);
     RUN_TEST(test_spectra_all_bins_equal_chosen_ones);
     RUN_TEST(test_spectra_of_both_keep_a_small_signal_beside_a_large_one);
     RUN_TEST(test_stretch_near_equals_the_whole_transform);

@@ -14,6 +14,7 @@
 #include "tools/servoscope/designing.h"
 #include "tools/servoscope/interrupt.h"
 #include "tools/servoscope/outputs.h"
+#include "tools/servoscope/separating.h"
 #include "tools/servoscope/sequences.h"
 
 #include <math.h>
@@ -29,6 +30,7 @@ struct work {
     struct design_offset offset;
     struct sim_model start_model;
     struct sim_model predict_model;
+    struct separating separating; ///< with --separate
     const struct command_context *context;
     struct terminal_line line;
 };
@@ -209,7 +211,8 @@ static int design_multisine(struct work *self, struct error *out_error)
         .rate_hz = (double)request->rate_numerator_hz / request->rate_denominator,
         .period_samples = request->period_samples,
     };
-    int status = check_outputs(self->options, out_error);
+    const bool separate = self->options->separate != NULL;
+    int status = separate ? 0 : check_outputs(self->options, out_error); // it has names of its own
     status = status ? status : design_lines_parse(self->options->lines, &grid, request->seed, &lines, out_error);
     if (status) {
         return status;
@@ -218,7 +221,8 @@ static int design_multisine(struct work *self, struct error *out_error)
     request->bin_count = lines.count;
     status = design_amplitude_shape(self->options->amplitude, request, &shape, out_error);
     request->torque_shape = shape;
-    status = status ? status : design_one(self, out_error);
+    if (!status)
+        status = separate ? separating_run(&self->separating, out_error) : design_one(self, out_error);
     free(shape);
     design_lines_free(&lines);
     return status;
@@ -290,6 +294,11 @@ static int run(int argc, char **argv, const struct command_context *context, str
     status = status ? status : design_options_resolve(&options, &work.request, out_error);
     status = status ? status : design_options_offset(&options, &work.request, &work.offset, out_error);
     status = status ? status : read_models(&work, out_error);
+    if (!status && (options.separate || options.model)) {
+        status = separating_prepare(&options, &work.request, &work.separating, out_error);
+        work.separating.offset = &work.offset;
+        work.separating.context = context;
+    }
     if (status) {
         return status;
     }

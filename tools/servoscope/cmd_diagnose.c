@@ -240,6 +240,9 @@ static void print_summary(const struct diagnosis *self, const struct arguments *
     wording_headline(self, headline);
     wording_gain(self, gain);
     printf("%s\n%s\n", headline, gain);
+    for (size_t i = 0; i < self->oddities.count; i++) {
+        printf("Note: %s\n", self->oddities.texts[i]);
+    }
     print_causes("Causes", self->causes, self->cause_count);
     print_causes("What might be, without being claimed", self->candidates, self->candidate_count);
     print_gain(self);

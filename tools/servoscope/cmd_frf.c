@@ -4,9 +4,13 @@
 #include "lab/estimate/advise.h"
 #include "lab/estimate/arbitrary.h"
 #include "lab/estimate/clocked.h"
+#include "lab/estimate/frf_mean.h"
 #include "lab/estimate/method.h"
+#include "lab/estimate/parametric_frf.h"
 #include "lab/estimate/periodic.h"
+#include "lab/estimate/realisations.h"
 #include "lab/estimate/setup.h"
+#include "lab/record/atomic_file.h"
 #include "lab/record/frf_file.h"
 #include "lab/record/json_out.h"
 #include "lab/record/manifest.h"
@@ -14,11 +18,13 @@
 #include "tools/servoscope/command.h"
 #include "tools/servoscope/estimating_matrix.h"
 #include "tools/servoscope/estimating_outcome.h"
+#include "tools/servoscope/estimating_page.h"
 #include "tools/servoscope/estimating_pieces.h"
 #include "tools/servoscope/estimating_sequence.h"
 #include "tools/servoscope/options.h"
 #include "tools/servoscope/outputs.h"
 
+#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -120,8 +126,30 @@ static int read_order(const struct arguments *arguments, struct estimate_options
     return 0;
 }
 
+/// What would change nothing is refused, lest somebody believe that it did.
+static int check_used(const struct arguments *arguments, struct error *out_error)
+{
+    const struct {
+        const char *name;
+        bool given;
+        const char *methods;
+    } options[] = {
+        {"order", arguments->order != NULL, "lpm"},
+        {"half-width", arguments->half_width > 0, "lpm"},
+        {"segment", arguments->segment_samples > 0, "lpm, h1, indirect"},
+        {"reference", arguments->reference != NULL, "lpm, h1, indirect"},
+    };
+    for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
+        if (options[i].given && !strstr(options[i].methods, arguments->method)) {
+            return error_set(out_error, error_usage, "--%s is for --method %s, not %s", options[i].name,
+                             options[i].methods, arguments->method);
+        }
+    }
+    return 0;
+}
+
 /// What is for method parametric alone.
-static int read_parametric(const struct arguments *arguments, struct estimate_options *io_options,
+static int read_parametric(const struct arguments *arguments, enum setup_hold hold, struct estimate_options *io_options,
                            struct error *out_error)
 {
     const char *given = arguments->domain       ? "domain"
@@ -131,17 +159,14 @@ static int read_parametric(const struct arguments *arguments, struct estimate_op
     if (given && strcmp(arguments->method, "parametric") != 0) {
         return error_set(out_error, error_usage, "--%s is for --method parametric, not %s", given, arguments->method);
     }
-    if (arguments->model_out && arguments->runs.count > 1) {
-        return error_set(out_error, error_usage, "--model-out: %zu runs give as many models, expected one run",
-                         arguments->runs.count);
-    }
-    const char *domain = arguments->domain ? arguments->domain : "discrete";
+    const char *usual = hold == setup_zoh ? "discrete" : "continuous";
+    const char *domain = arguments->domain ? arguments->domain : usual;
     if (strcmp(domain, "discrete") != 0 && strcmp(domain, "continuous") != 0) {
         return error_set(out_error, error_usage, "--domain: '%s', expected discrete or continuous", domain);
     }
     io_options->continuous = strcmp(domain, "continuous") == 0;
+    io_options->held = hold == setup_zoh;
     io_options->delay_free = arguments->delay_free;
-    io_options->model_path = arguments->model_out;
     return 0;
 }
 
@@ -160,8 +185,9 @@ static int read_request(const struct arguments *arguments, struct request *out_r
     }
     out_request->cut.settle = out_request->method->models_transient ? periodic_settle_keep : periodic_settle_default;
     int status = arguments->hold ? setup_hold_parse(arguments->hold, &out_request->hold, out_error) : 0;
+    status = status ? status : check_used(arguments, out_error);
     status = status ? status : read_order(arguments, &out_request->tuning, out_error);
-    status = status ? status : read_parametric(arguments, &out_request->tuning, out_error);
+    status = status ? status : read_parametric(arguments, out_request->hold, &out_request->tuning, out_error);
     return status ? status : read_settle(arguments, &out_request->cut, out_error);
 }
 
@@ -187,7 +213,7 @@ static int read_lines(const struct arguments *arguments, const struct run *run, 
     return status;
 }
 
-static void summarise(const struct periodic *recording, struct estimating_summary *out_summary)
+static bool summarise(const struct periodic *recording, struct estimating_summary *out_summary)
 {
     *out_summary = (struct estimating_summary){
         .period_samples = recording->period_samples,
@@ -198,11 +224,36 @@ static void summarise(const struct periodic *recording, struct estimating_summar
         .used = recording->used,
         .period_found = recording->period_found,
         .bins_found = recording->bins_found,
+        .doubtful = recording->doubtful_count,
         .transient = recording->transient,
         .first_level = recording->output_level[0],
         .last_level = recording->output_level[recording->total - 1],
     };
     estimate_advise(recording, &out_summary->advice);
+    out_summary->levels = malloc(recording->total * sizeof *out_summary->levels);
+    if (out_summary->levels) {
+        memcpy(out_summary->levels, recording->output_level, recording->total * sizeof *out_summary->levels);
+    }
+    return out_summary->levels != NULL;
+}
+
+/// A model by itself is no measurement: the page shows it beside the lines that it was fitted to.
+static int estimate_by(const struct request *request, const struct periodic *recording, struct frf *out_frf,
+                       struct estimating_summary *io_summary, struct error *out_error)
+{
+    struct estimate_options tuning = request->tuning;
+    if (strcmp(request->method->name, "parametric") == 0) {
+        io_summary->parametric = calloc(1, sizeof *io_summary->parametric);
+        if (!io_summary->parametric) {
+            return error_set(out_error, error_refused, "memory is short");
+        }
+        tuning.parametric = io_summary->parametric;
+    }
+    int status = request->method->estimate(recording, &tuning, out_frf, out_error);
+    if (!status && io_summary->parametric) {
+        status = frf_mean_estimate(recording, NULL, &io_summary->measured, out_error);
+    }
+    return status;
 }
 
 static int estimate_without_period(const struct run *run, const struct request *request, struct frf *out_frf,
@@ -233,13 +284,21 @@ static int estimate_periods(const struct run *run, const struct request *request
     if (status && recording->aperiodic && request->method->estimate_arbitrary) {
         return estimate_without_period(run, request, out_frf, out_summary, out_error);
     }
+    if (!status && request->tuning.segment_samples > 0) {
+        status = error_set(out_error, error_usage,
+                           "--segment: %s repeats every %zu samples and is taken period by period: expected no "
+                           "--segment, which is for recordings without a period",
+                           run->path, recording->period_samples);
+        clocked_free(&clocked);
+    }
     if (status) {
         return status;
     }
-    status = request->method->estimate(recording, &request->tuning, out_frf, out_error);
-    summarise(recording, out_summary);
+    status = summarise(recording, out_summary) ? estimate_by(request, recording, out_frf, out_summary, out_error)
+                                               : error_set(out_error, error_refused, "memory is short");
     if (!status && (!estimating_findings_measure(recording, inputs, out_frf, &out_summary->findings) ||
-                    !estimating_checks_measure(&clocked, out_frf, &out_summary->checks))) {
+                    !estimating_checks_measure(&clocked, out_frf, &out_summary->checks) ||
+                    !estimating_summary_excite(out_summary, recording))) {
         status = estimate_refuse_memory(out_frf, out_error);
     }
     clocked_free(&clocked);
@@ -249,7 +308,10 @@ static int estimate_periods(const struct run *run, const struct request *request
 static int estimate_run(const char *path, const struct arguments *arguments, struct request request,
                         struct frf *out_frf, struct estimating_summary *out_summary, struct error *out_error)
 {
-    const struct run_options run_options = {.map = arguments->map, .rate_hz = arguments->rate_hz};
+    const struct run_options run_options = {.map = arguments->map,
+                                            .rate_hz = arguments->rate_hz,
+                                            .guess = true,
+                                            .keep = {arguments->input, arguments->output, arguments->reference}};
     const char *needs_whole = strcmp(request.method->name, "mean") != 0 ? request.method->name : NULL;
     struct estimating_pieces pieces;
     struct design_lines lines = {0};
@@ -273,6 +335,10 @@ static int estimate_run(const char *path, const struct arguments *arguments, str
     } else if (!status) {
         status = estimate_periods(run, &request, several, out_frf, out_summary, out_error);
     }
+    if (!status && run_key(run, "columns_named") &&
+        !estimate_set_key(out_frf, "columns_named", "%s", run_key(run, "columns_named"))) {
+        status = estimate_refuse_memory(out_frf, out_error);
+    }
     design_lines_free(&lines);
     inputs_free(&inputs);
     estimating_matrix_give_back(request.matrix, &pieces);
@@ -293,6 +359,7 @@ static void merge_summary(struct estimating_summary *whole, const struct estimat
     if (before.used_most == 0 || one->last_level > before.last_level) {
         *whole = *one;
         whole->findings = before.findings;
+        whole->excitations = before.excitations;
     }
     whole->used = before.used_most == 0 || one->used < before.used ? one->used : before.used;
     whole->used_most = one->used > before.used_most ? one->used : before.used_most;
@@ -308,6 +375,9 @@ static int estimate_segment(void *context, const char *path, const struct run_se
     struct estimating_summary one = {.used = 0};
     request.segment = segment;
     int status = estimate_run(path, self->arguments, request, out_frf, &one, out_error);
+    const bool excited = status || excitations_move(&one.excitations, &self->whole->excitations);
+    estimating_summary_drop(&one);
+    status = excited ? status : estimate_refuse_memory(out_frf, out_error);
     if (!status) {
         merge_summary(self->whole, &one);
         status = estimating_findings_merge(&self->whole->findings, &one.findings)
@@ -343,13 +413,46 @@ static int print_json(cJSON *object, struct error *out_error)
     return status;
 }
 
+/// The model of method parametric, for --model-out.
+static int write_model(const struct arguments *arguments, const struct estimating_outcome *outcome,
+                       struct error *out_error)
+{
+    const struct parametric_outcome *found = outcome->runs[0].parametric;
+    if (!arguments->model_out || !found || !found->made) {
+        return 0;
+    }
+    cJSON *object = parametric_outcome_json(found, true);
+    int status = object ? json_write(arguments->model_out, object, out_error)
+                        : error_set(out_error, error_refused, "%s: memory is short", arguments->model_out);
+    cJSON_Delete(object);
+    return status;
+}
+
+/// Writes everything that was asked for. The page, which is the largest, is put in place last, once the rest is there.
+static int write_files(const struct arguments *arguments, const struct estimating_page_item *items, size_t count,
+                       struct error *out_error)
+{
+    struct atomic_file page = {NULL, NULL, NULL};
+    int status = 0;
+    if (arguments->report) {
+        status = estimating_page_write(arguments->report, items, count, &page, out_error);
+    }
+    for (size_t i = 0; i < count && !status; i++) {
+        status = frf_write(items[i].out, &items[i].outcome->frf, out_error);
+    }
+    status = status ? status : write_model(arguments, items[0].outcome, out_error);
+    if (status || !arguments->report) {
+        atomic_file_discard(&page);
+        return status;
+    }
+    return atomic_file_commit(&page, out_error);
+}
+
 static int write_and_report(const struct arguments *arguments, const struct estimating_outcome *outcome,
                             const struct command_context *context, struct error *out_error)
 {
-    int status = frf_write(arguments->out, &outcome->frf, out_error);
-    if (!status && arguments->report) {
-        status = estimating_outcome_write_page(arguments->report, outcome, 1, out_error);
-    }
+    const struct estimating_page_item item = {outcome, &arguments->runs, arguments->out};
+    int status = write_files(arguments, &item, 1, out_error);
     if (status) {
         return status;
     }
@@ -362,20 +465,51 @@ static int write_and_report(const struct arguments *arguments, const struct esti
     return 0;
 }
 
-/// Several runs are realisations.
+/// Passes on why runs cannot be taken together: "run 2" becomes "run 2 (other.csv)".
+static int refuse_by_name(const struct error *reason, const struct option_values *runs, struct error *out_error)
+{
+    char message[sizeof reason->message] = "";
+    size_t used = 0;
+    const char *at = reason->message;
+    while (*at && used + 1 < sizeof message) {
+        char *end = NULL;
+        const bool counts = strncmp(at, "run ", 4) == 0 && isdigit((unsigned char)at[4]);
+        const unsigned long number = counts ? strtoul(at + 4, &end, 10) : 0;
+        if (number < 1 || number > runs->count) {
+            message[used++] = *at++;
+            continue;
+        }
+        const int length =
+            snprintf(message + used, sizeof message - used, "run %lu (%s)", number, runs->items[number - 1]);
+        used += length > 0 && (size_t)length < sizeof message - used ? (size_t)length : sizeof message - used - 1;
+        at = end;
+    }
+    message[used] = '\0';
+    return error_set(out_error, reason->status, "%s", message);
+}
+
+/// Several runs are realisations, but for those of the same excitation.
 static int combine(const struct arguments *arguments, struct frf *responses, struct estimating_outcome *io_outcome,
                    struct error *out_error)
 {
-    if (arguments->runs.count == 1) {
+    const size_t count = arguments->runs.count;
+    if (count == 1) {
         io_outcome->frf = responses[0];
         responses[0] = (struct frf){0};
         return 0;
     }
-    int status = estimate_average(responses, arguments->runs.count, &io_outcome->frf, out_error);
-    if (!status && !agreement_measure(responses, arguments->runs.count, &io_outcome->findings.agreed)) {
-        status = estimate_refuse_memory(&io_outcome->frf, out_error);
+    struct excitations *excitations = malloc(count * sizeof *excitations);
+    if (!excitations) {
+        return error_set(out_error, error_refused, "memory is short");
     }
-    return status;
+    for (size_t r = 0; r < count; r++) {
+        excitations[r] = io_outcome->runs[r].excitations;
+    }
+    struct error reason = {0, ""};
+    int status =
+        realisations_combine(responses, excitations, count, &io_outcome->frf, &io_outcome->findings.agreed, &reason);
+    free(excitations);
+    return status ? refuse_by_name(&reason, &arguments->runs, out_error) : 0;
 }
 
 /// What the response is one of, and what its runs show beside it, as its keys.
@@ -390,14 +524,52 @@ static int finish(const struct arguments *arguments, const struct request *reque
         done = estimating_checks_carry(&io_outcome->runs[r].checks, &io_outcome->frf);
     }
     setup_remove_delay(&io_outcome->frf, arguments->delay_s);
+    for (size_t r = 0; r < io_outcome->run_count; r++) {
+        struct frf *measured = &io_outcome->runs[r].measured;
+        setup_remove_delay(measured, arguments->delay_s);
+        done = done && (measured->count == 0 || setup_set_keys(measured, request->hold, arguments->delay_s));
+        if (io_outcome->responses) {
+            setup_remove_delay(&io_outcome->responses[r], arguments->delay_s);
+        }
+    }
     done = done && setup_set_keys(&io_outcome->frf, request->hold, arguments->delay_s) &&
+           estimating_findings_judge(&io_outcome->findings, &io_outcome->frf) &&
            estimating_findings_set_keys(&io_outcome->findings, &io_outcome->frf);
     return done ? 0 : estimate_refuse_memory(&io_outcome->frf, out_error);
 }
 
-static int estimate_all(const struct arguments *arguments, const struct request *request,
-                        struct estimating_outcome *out, struct error *out_error)
+/// Runs of a sequence or realisations have one model, of the response that they give together.
+static bool fits_afterwards(const struct arguments *arguments, const struct request *request)
 {
+    return strcmp(request->method->name, "parametric") == 0 &&
+           (arguments->runs.count > 1 || manifest_is(arguments->runs.items[0]));
+}
+
+/// Replaces the response by that of the model fitted to it, which is kept with the first run.
+static int fit_afterwards(const struct arguments *arguments, const struct request *request,
+                          struct estimating_outcome *io_outcome, struct error *out_error)
+{
+    struct estimating_summary *first = &io_outcome->runs[0];
+    struct estimate_options tuning = request->tuning;
+    first->parametric = calloc(1, sizeof *first->parametric);
+    if (!first->parametric) {
+        return error_set(out_error, error_refused, "memory is short");
+    }
+    tuning.parametric = first->parametric;
+    first->measured = io_outcome->frf;
+    io_outcome->frf = (struct frf){0};
+    return frf_parametric_fit(&first->measured, arguments->runs.items[0], &tuning, &io_outcome->frf, out_error);
+}
+
+static int estimate_all(const struct arguments *arguments, const struct request *asked, struct estimating_outcome *out,
+                        struct error *out_error)
+{
+    const bool afterwards = fits_afterwards(arguments, asked);
+    struct request of_runs = *asked;
+    const struct request *request = &of_runs;
+    if (afterwards) {
+        of_runs.method = estimate_method_find("mean", NULL);
+    }
     const size_t count = arguments->runs.count;
     struct frf *responses = calloc(count, sizeof *responses);
     *out = (struct estimating_outcome){.runs = calloc(count, sizeof *out->runs)};
@@ -406,13 +578,12 @@ static int estimate_all(const struct arguments *arguments, const struct request 
     for (size_t r = 0; r < count && !status; r++) {
         status = estimate_source(arguments->runs.items[r], arguments, request, &responses[r], &out->runs[r], out_error);
     }
+    out->responses = responses;
     status = status ? status : combine(arguments, responses, out, out_error);
-    status = status ? status : finish(arguments, request, out, out_error);
-    for (size_t r = 0; r < count && responses; r++) {
-        frf_free(&responses[r]);
+    if (!status && afterwards) {
+        status = fit_afterwards(arguments, asked, out, out_error);
     }
-    free(responses);
-    return status;
+    return status ? status : finish(arguments, request, out, out_error);
 }
 
 /// One output from one input of a machine with several.
@@ -461,13 +632,13 @@ static int report_pairs(const struct arguments *arguments, const struct estimati
                         const struct command_context *context, struct error *out_error)
 {
     const size_t count = matrix->input_count * matrix->output_count;
-    int status = 0;
-    for (size_t i = 0; i < count && !status; i++) {
-        status = frf_write(pairs[i].out, &outcomes[i].frf, out_error);
+    struct estimating_page_item *items = malloc(count * sizeof *items);
+    for (size_t i = 0; i < count && items; i++) {
+        items[i] = (struct estimating_page_item){&outcomes[i], &pairs[i].runs, pairs[i].out};
     }
-    if (!status && arguments->report) {
-        status = estimating_outcome_write_page(arguments->report, outcomes, count, out_error);
-    }
+    int status = items ? write_files(arguments, items, count, out_error)
+                       : error_set(out_error, error_refused, "memory is short");
+    free(items);
     if (!status && context->json) {
         return print_json(json_of_pairs(arguments, matrix, pairs, outcomes), out_error);
     }
@@ -556,8 +727,10 @@ const struct command command_cmd_frf = {
         "closed loop\n"
         "  --method indirect    output and input against the reference: arbitrary signals in a closed loop\n"
         "  --method parametric  transfer function by maximum likelihood, its orders chosen from the data\n"
-        "  --domain DOMAIN      parametric: discrete (default: input held between samples) or continuous\n"
-        "  --delay-free         parametric: a delay is estimated too\n"
+        "  --domain DOMAIN      parametric: discrete (default with --hold zoh) or continuous; of held input that is "
+        "the\n"
+        "                       model in 1/z turned into s without the hold\n"
+        "  --delay-free         parametric: a delay of any length is estimated (default: found if there is one)\n"
         "  --model-out M.json   parametric: coefficients, poles, zeros, gain, with standard deviations\n"
         "  --settle S           leading periods to leave out; auto: found from the decay of the transient\n"
         "                       (default: the run's settle_periods, else auto; for lpm none)\n"
@@ -574,7 +747,10 @@ const struct command command_cmd_frf = {
         "  --lines SPEC         as for servoscope design, e.g. linear:1:100:1 (default: the run's excited_bins, "
         "else found\n"
         "                       by their power)\n"
-        "  --map NAME=COLUMN[*SCALE],...  --rate HZ    for recordings of others\n"
+        "  --map NAME=COLUMN[*SCALE],...  --rate HZ    for recordings of others (default: columns are named by the "
+        "units "
+        "in\n"
+        "                       their names, and what was taken is said)\n"
         "  --design D.json      several inputs: the manifest of design --inputs that says which lines are whose "
         "(default:\n"
         "                       found by their power)\n"
@@ -583,7 +759,8 @@ const struct command command_cmd_frf = {
         "                       anti-alias filter. Said in the file; the numbers are the same\n"
         "  --delay S            a known delay, taken out of the response\n"
         "  --out FRF.csv        frequency_hz,real,imag,std,noise_std,...,valid\n"
-        "  --report FILE.html   a page: Bode diagram with its uncertainty\n"
+        "  --report FILE.html   a page: what was found, Bode diagram with 95 % regions, residuals, distortion, "
+        "settling\n"
         "\n"
         "The manifest that measure writes for a sequence (octaves, dwell) stands for all of its runs: each segment "
         "is\n"

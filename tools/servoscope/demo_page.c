@@ -94,11 +94,12 @@ static void write_sections(FILE *stream, const struct demo_page *self, const str
                            const struct frf *extended)
 {
     const struct frf_model_curve curves[] = {
-        {"nominal model", nominal->count, nominal->frequency_hz, nominal->real, nominal->imag},
-        {"extended model", extended->count, extended->frequency_hz, extended->real, extended->imag},
+        {"nominal model", nominal->count, nominal->frequency_hz, nominal->real, nominal->imag, NULL},
+        {"extended model", extended->count, extended->frequency_hz, extended->real, extended->imag, NULL},
     };
     const struct frf_report_options options = {
-        .known_delay_s = 0.5 / self->runs[0].sample_rate_hz, // torque is held between samples
+        .known_delay_s = 0.5 / self->runs[0].sample_rate_hz,
+        .delay_reason = "half a sample: torque is held between samples",
         .curve_count = self->diagnosis->cause_count > 0 ? 2 : 1,
         .curves = curves,
     };

@@ -22,6 +22,7 @@ int design_options_read(int argc, char **argv, struct design_options *out, struc
         .inputs = 1,
         .periods = 10,
         .settle_time_s = NAN,
+        .nats = 20,
     };
     const struct option options[] = {
         {.name = "rate", .kind = option_text, .target = &out->rate, .required = true},
@@ -70,6 +71,9 @@ int design_options_read(int argc, char **argv, struct design_options *out, struc
         {.name = "periods", .kind = option_integer, .target = &out->periods, .lowest = 1, .highest = 1e9},
         {.name = "settle-time", .kind = option_number, .target = &out->settle_time_s, .lowest = 0, .highest = 1e9},
         {.name = "predict", .kind = option_text, .target = &out->predict},
+        {.name = "separate", .kind = option_text, .target = &out->separate},
+        {.name = "model", .kind = option_text, .target = &out->model},
+        {.name = "nats", .kind = option_positive, .target = &out->nats},
     };
     return options_parse(argc, argv, options, sizeof options / sizeof options[0], NULL, out_error);
 }

@@ -43,6 +43,9 @@ struct design_options {
     long long periods;    ///< 10; counted ones, for test time, travel and prediction
     double settle_time_s; ///< NAN: one period
     const char *predict;  ///< a model file
+    const char *separate; ///< CAUSE,CAUSE
+    const char *model;    ///< with separate: the drive as it is known, a model file
+    double nats;          ///< 20; with separate: how far apart is enough
 };
 
 /// Reads the command line; defaults are set first.

@@ -10,9 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/// One period as it was designed, and where in it to begin: the player starts at start_index.
-static int fill_table(const struct design_request *request, const struct design_result *result, struct table *out_table,
-                      struct error *out_error)
+int designing_table(const struct design_request *request, const struct design_result *result, struct table *out_table,
+                    struct error *out_error)
 {
     const uint32_t samples = (uint32_t)result->period_samples;
     int status = table_alloc(out_table, samples, msgen_channels_max, (uint32_t)result->bin_count, out_error);
@@ -42,7 +41,7 @@ int designing_write(const char *prefix, const struct design_request *request, co
     struct table table = {0};
     const size_t path_size = strlen(prefix) + 5;
     char *path = malloc(path_size);
-    int status = path ? fill_table(request, result, &table, out_error)
+    int status = path ? designing_table(request, result, &table, out_error)
                       : error_set(out_error, error_refused, "memory is short for the file names");
     for (size_t i = 0; !status && i < sizeof files / sizeof files[0]; i++) {
         snprintf(path, path_size, "%s%s", prefix, files[i].ending);

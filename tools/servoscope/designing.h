@@ -5,6 +5,12 @@
 
 #include "lab/design/design.h"
 #include "lab/record/error.h"
+#include "lab/record/table_file.h"
+
+/// One period as it was designed, and where in it to begin: the player starts at start_index.
+/// Errors: error_refused if memory is short; *out_table is empty then
+int designing_table(const struct design_request *request, const struct design_result *result, struct table *out_table,
+                    struct error *out_error);
 
 /// Writes PREFIX.csv, PREFIX.h and PREFIX.mst, the table last: where it is, the others are.
 /// Errors: error_refused with the path and the reason; files already in place stay whole

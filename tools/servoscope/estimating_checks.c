@@ -63,30 +63,34 @@ static double parts_per_million(const struct estimating_checks *self, double sam
     return 1e6 * samples / (double)self->period_samples;
 }
 
-static void print_clock(const struct estimating_checks *self)
+static void say_clock(const struct estimating_checks *self, struct remarks *io_remarks)
 {
     const struct clock *clock = &self->clock;
     const double length = (double)self->period_samples;
+    char drift[160] = "";
+    char wander[64] = "";
     if (clock->state == clock_apart) {
-        printf("  warning: the input repeats every %.9g samples, the output every %.9g: two clocks, or a drive that "
-               "changes\n",
-               length + clock->input.offset_samples, length + clock->output.offset_samples);
+        remarks_add(io_remarks, remark_warning, "clock",
+                    "the input repeats every %.9g samples, the output every %.9g: two clocks, or a drive that changes",
+                    length + clock->input.offset_samples, length + clock->output.offset_samples);
     }
     if (clock->state != clock_off) {
         return;
     }
-    printf("  a period is %.9g samples (std %.2g), not %zu: %+.3g ppm", length + clock->both.offset_samples,
-           clock->both.offset_std, self->period_samples, parts_per_million(self, clock->both.offset_samples));
     if (clock->both.drift_samples != 0.0) {
-        printf(", and drifts by %.3g ppm per period", parts_per_million(self, clock->both.drift_samples));
+        snprintf(drift, sizeof drift, ", and drifts by %.3g ppm per period",
+                 parts_per_million(self, clock->both.drift_samples));
     }
     if (clock->both.wander > 0.0) {
-        printf(", and wanders by %.2g samples", clock->both.wander);
+        snprintf(wander, sizeof wander, ", and wanders by %.2g samples", clock->both.wander);
     }
-    printf(self->resampled ? "; resampled to it\n" : "; too little to matter\n");
+    remarks_add(io_remarks, remark_fact, "clock", "a period is %.9g samples (std %.2g), not %zu: %+.3g ppm%s%s; %s",
+                length + clock->both.offset_samples, clock->both.offset_std, self->period_samples,
+                parts_per_million(self, clock->both.offset_samples), drift, wander,
+                self->resampled ? "resampled to it" : "too little to matter");
 }
 
-static void print_succession(const struct succession *self)
+static void say_succession(const struct succession *self, struct remarks *io_remarks)
 {
     if (!self->certain) {
         return;
@@ -96,23 +100,24 @@ static void print_succession(const struct succession *self)
         largest = fmax(largest, self->factor[block]);
     }
     if (largest > 1.0) {
-        printf(
-            "  scatter of successive periods is alike (correlation %.2g over all lines): std is up to %.3g times what "
-            "independent periods would give\n",
-            self->correlation, largest);
+        remarks_add(io_remarks, remark_fact, "period_correlation",
+                    "scatter of successive periods is alike (correlation %.2g over all lines): std is up to %.3g times "
+                    "what independent periods would give",
+                    self->correlation, largest);
     } else {
-        printf(
-            "  scatter of successive periods alternates (correlation %.2g over all lines): std is rather too large\n",
-            self->correlation);
+        remarks_add(io_remarks, remark_fact, "period_correlation",
+                    "scatter of successive periods alternates (correlation %.2g over all lines): std is rather too "
+                    "large",
+                    self->correlation);
     }
 }
 
-void estimating_checks_print(const struct estimating_checks *self)
+void estimating_checks_say(const struct estimating_checks *self, struct remarks *io_remarks)
 {
-    print_clock(self);
-    print_succession(&self->succession);
+    say_clock(self, io_remarks);
+    say_succession(&self->succession, io_remarks);
     if (self->direction[0]) {
-        printf("  warning: %s\n", self->direction);
+        remarks_add(io_remarks, remark_warning, "direction", "%s", self->direction);
     }
 }
 

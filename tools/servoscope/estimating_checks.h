@@ -8,6 +8,7 @@
 #include "lab/estimate/direction.h"
 #include "lab/estimate/succession.h"
 #include "lab/record/frf_file.h"
+#include "tools/servoscope/remarks.h"
 
 #include <cjson/cJSON.h>
 #include <stdbool.h>
@@ -32,7 +33,8 @@ bool estimating_checks_apply(const struct estimating_checks *self, struct frf *i
 /// What of several recordings a response of them all has to say: the keys of the first that says something.
 bool estimating_checks_carry(const struct estimating_checks *self, struct frf *io_frf);
 
-void estimating_checks_print(const struct estimating_checks *self);
+/// Says it to a person: lines of the run that remarks_about() has set.
+void estimating_checks_say(const struct estimating_checks *self, struct remarks *io_remarks);
 void estimating_checks_add_json(const struct estimating_checks *self, cJSON *io_object);
 
 #endif

@@ -65,8 +65,8 @@ bool estimating_findings_measure(const struct periodic *recording, const struct 
         .foreign_share = inputs ? inputs->foreign_share : 0.0,
     };
     note_load_column(recording, out);
-    if (!repetition_test(recording, &out->repetition) || !harmonics_measure(recording, &harmonics) ||
-        !measure_distortion(recording, inputs, io_frf, out)) {
+    if (!repetition_test(recording, &out->repetition) || !oscillation_measure(recording, &out->oscillation) ||
+        !harmonics_measure(recording, &harmonics) || !measure_distortion(recording, inputs, io_frf, out)) {
         return false;
     }
     out->late = out->repetition.multiple > 1;
@@ -90,6 +90,9 @@ bool estimating_findings_merge(struct estimating_findings *self, const struct es
         self->repetition = other->repetition;
         self->late_first_hz = other->late_first_hz;
         self->late_last_hz = other->late_last_hz;
+    }
+    if (other->oscillation.found && !(self->oscillation.found && self->oscillation.level > other->oscillation.level)) {
+        self->oscillation = other->oscillation;
     }
     if (self->load_column[0] == '\0') {
         memcpy(self->load_column, other->load_column, sizeof self->load_column);
@@ -229,6 +232,19 @@ static bool set_repetition(const struct estimating_findings *self, struct frf *i
                             fmax(repetition->chance, 1e-99), self->late, self->recordings);
 }
 
+static bool set_oscillation(const struct oscillation *oscillation, struct frf *io_frf)
+{
+    return !oscillation->found ||
+           (estimate_set_key(io_frf, "oscillation_hz", "%.6g", oscillation->frequency_hz) &&
+            estimate_set_key(io_frf, "oscillation_level", "%.4g", oscillation->level) &&
+            estimate_set_key(
+                io_frf, "warning_oscillation",
+                "the output oscillates by itself at %.6g Hz, %.2g times as much as the excitation moves it "
+                "(RMS): a limit cycle, a loop close to instability, or a disturbance. It does not settle, "
+                "and std takes it for noise",
+                oscillation->frequency_hz, oscillation->level));
+}
+
 static bool set_agreement(const struct estimating_findings *self, struct frf *io_frf)
 {
     const struct agreement *agreed = &self->agreed;
@@ -254,18 +270,51 @@ static bool set_foreign(const struct estimating_findings *self, struct frf *io_f
     return set;
 }
 
+bool estimating_findings_judge(struct estimating_findings *self, const struct frf *frf)
+{
+    if (strcmp(frf->method, "parametric") == 0) {
+        return true;
+    }
+    double *distances = malloc((frf->count + 1) * sizeof *distances);
+    const bool done = distances && smoothness_measure(frf, distances, &self->smoothness);
+    free(distances);
+    return done;
+}
+
+static bool set_scatter(const struct estimating_findings *self, struct frf *io_frf)
+{
+    const struct smoothness *scatter = &self->smoothness;
+    if (scatter->lines == 0) {
+        return true;
+    }
+    bool set = estimate_set_key(io_frf, "line_scatter_ratio", "%.4g", scatter->ratio);
+    if (set && smoothness_is_rough(scatter)) {
+        set =
+            estimate_set_key(io_frf, "line_scatter_db", "%.4g", decibel(scatter->level)) &&
+            estimate_set_key(io_frf, "warning_scatter",
+                             "lines lie %.3g times as far from a smooth curve as std explains (median), by %.1f dB of "
+                             "the response: what repeats in every period, as nonlinear distortion and disturbances "
+                             "on the lines do, moves them and is not in std; %s",
+                             scatter->ratio, decibel(scatter->level),
+                             self->agreed.lines > 0 ? "more runs with other phases would average it"
+                                                    : "several runs with other phases would put it there");
+    }
+    return set;
+}
+
 bool estimating_findings_set_keys(const struct estimating_findings *self, struct frf *io_frf)
 {
     bool set = set_distortion(self, io_frf) && set_repetition(self, io_frf) && set_agreement(self, io_frf) &&
-               set_foreign(self, io_frf);
+               set_oscillation(&self->oscillation, io_frf) && set_foreign(self, io_frf) && set_scatter(self, io_frf);
     return set && (self->harmonics_count == 0 ||
                    (set_thd(self, "thd_db", false, io_frf) && set_thd(self, "input_thd_db", true, io_frf)));
 }
 
-static void print_distortion(const struct estimating_findings *self, const struct frf *frf)
+static void say_distortion(const struct estimating_findings *self, const struct frf *frf, struct remarks *io_remarks)
 {
     static const char *const what[distortion_kinds] = {"odd-order distortion", "even-order distortion",
                                                        "distortion of any order"};
+    static const char *const ids[distortion_kinds] = {"odd_distortion", "even_distortion", "distortion"};
     for (int kind = 0; kind < distortion_kinds; kind++) {
         const struct distortion_level *level = &self->distortion.kind[kind];
         if (level->bins == 0) {
@@ -273,20 +322,25 @@ static void print_distortion(const struct estimating_findings *self, const struc
         }
         const double chance = distortion_chance(level);
         const double median = median_level(self, kind, frf);
-        printf("  %s at %zu free bins: ", what[kind], level->bins);
         if (chance < believed && median > 0.0) {
-            printf("%.1f dB of the response (median; noise alone stays below %.1f dB)%s\n", decibel(median),
-                   decibel(level->limit), kind == distortion_odd && self->agreed.lines == 0 ? "; not in std" : "");
+            remarks_add(io_remarks, remark_fact, ids[kind],
+                        "%s at %zu free bins: %.1f dB of the response (median; noise alone stays below %.1f dB)%s",
+                        what[kind], level->bins, decibel(median), decibel(level->limit),
+                        kind == distortion_odd && self->agreed.lines == 0 ? "; not in std" : "");
         } else if (chance < believed) {
-            printf("there is some, at most lines below %.1f dB of the response\n", decibel(level->limit));
+            remarks_add(io_remarks, remark_fact, ids[kind],
+                        "%s at %zu free bins: there is some, at most lines below %.1f dB of the response", what[kind],
+                        level->bins, decibel(level->limit));
         } else {
-            printf("none above the noise, which is below %.1f dB of the response (95 %%)\n", decibel(level->limit));
+            remarks_add(io_remarks, remark_fact, ids[kind],
+                        "%s at %zu free bins: none above the noise, which is below %.1f dB of the response (95 %%)",
+                        what[kind], level->bins, decibel(level->limit));
         }
     }
 }
 
 /// The strongest harmonics of a dwell.
-static void print_harmonics(const struct estimating_findings *self, const struct frf *frf)
+static void say_harmonics(const struct estimating_findings *self, const struct frf *frf, struct remarks *io_remarks)
 {
     double highest = NAN;
     double where_hz = 0.0;
@@ -298,40 +352,54 @@ static void print_harmonics(const struct estimating_findings *self, const struct
         }
     }
     if (self->harmonics_count > 0 && isnan(highest)) {
-        printf("  no harmonics above the noise\n");
+        remarks_add(io_remarks, remark_fact, "harmonics", "no harmonics above the noise");
     } else if (self->harmonics_count > 0) {
-        printf("  total harmonic distortion at most %.2f dB, at %.6g Hz (all lines: key thd_db)\n", highest, where_hz);
+        remarks_add(io_remarks, remark_fact, "harmonics",
+                    "total harmonic distortion at most %.2f dB, at %.6g Hz (all lines: key thd_db)", highest, where_hz);
     }
 }
 
-static void print_agreement(const struct agreement *agreed)
+static void say_agreement(const struct agreement *agreed, struct remarks *io_remarks)
 {
     if (agreed->lines == 0) {
         return;
     }
     if (agreement_differs(agreed)) {
-        printf("  the %zu realisations differ by %.3g times their noise (median; by chance less than %.1g): nonlinear "
-               "distortion, or a drive that has changed between them, of %.1f dB of the response in each\n",
-               agreed->realisations, agreed->ratio, fmax(agreed->chance, 1e-99), decibel(agreed->level));
+        remarks_add(io_remarks, remark_fact, "realisations",
+                    "the %zu realisations differ by %.3g times their noise (median; by chance less than %.1g): "
+                    "nonlinear distortion, or a drive that has changed between them, of %.1f dB of the response in "
+                    "each",
+                    agreed->realisations, agreed->ratio, fmax(agreed->chance, 1e-99), decibel(agreed->level));
     } else {
-        printf("  the %zu realisations agree within their noise (as much scatter by chance: %.2g)\n",
-               agreed->realisations, agreed->chance);
+        remarks_add(io_remarks, remark_fact, "realisations",
+                    "the %zu realisations agree within their noise (as much scatter by chance: %.2g)",
+                    agreed->realisations, agreed->chance);
     }
 }
 
-void estimating_findings_print(const struct estimating_findings *self, const struct frf *frf)
+/// Keys that are sentences a reader must not miss, and their kind.
+static const struct {
+    const char *key, *id;
+} warnings[] = {
+    {"warning_repetition", "repetition"},     {"warning_oscillation", "oscillation"}, {"warning_inputs", "inputs"},
+    {"warning_realisations", "realisations"}, {"warning_scatter", "scatter"},
+};
+
+enum { warning_count = sizeof warnings / sizeof warnings[0] };
+
+void estimating_findings_say(const struct estimating_findings *self, const struct frf *frf, struct remarks *io_remarks)
 {
-    print_agreement(&self->agreed);
-    print_distortion(self, frf);
-    print_harmonics(self, frf);
-    static const char *const warnings[] = {"warning_repetition", "warning_inputs"};
-    for (size_t i = 0; i < sizeof warnings / sizeof warnings[0]; i++) {
-        if (estimate_key(frf, warnings[i])[0]) {
-            printf("  warning: %s\n", estimate_key(frf, warnings[i]));
+    say_agreement(&self->agreed, io_remarks);
+    say_distortion(self, frf, io_remarks);
+    say_harmonics(self, frf, io_remarks);
+    for (size_t i = 0; i < warning_count; i++) {
+        if (estimate_key(frf, warnings[i].key)[0]) {
+            remarks_add(io_remarks, remark_warning, warnings[i].id, "%s", estimate_key(frf, warnings[i].key));
         }
     }
     if (self->load_column[0]) {
-        printf("  the load is measured too: --output %s for its response\n", self->load_column);
+        remarks_add(io_remarks, remark_advice, "load", "the load is measured too: --output %s for its response",
+                    self->load_column);
     }
 }
 
@@ -366,11 +434,17 @@ static void add_agreement_json(const struct agreement *agreed, cJSON *io_object)
 
 void estimating_findings_add_json(const struct estimating_findings *self, const struct frf *frf, cJSON *io_object)
 {
-    static const char *const texts[] = {"hold", "actuator", "warning_repetition", "warning_inputs"};
-    static const char *const numbers[] = {"delay_removed_s", "other_inputs_db"};
+    static const char *const texts[] = {"hold", "actuator", "columns_named"};
+    static const char *const numbers[] = {"delay_removed_s", "other_inputs_db", "line_scatter_ratio",
+                                          "line_scatter_db", "oscillation_hz",  "oscillation_level"};
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         if (estimate_key(frf, texts[i])[0]) {
             cJSON_AddStringToObject(io_object, texts[i], estimate_key(frf, texts[i]));
+        }
+    }
+    for (size_t i = 0; i < warning_count; i++) {
+        if (estimate_key(frf, warnings[i].key)[0]) {
+            cJSON_AddStringToObject(io_object, warnings[i].key, estimate_key(frf, warnings[i].key));
         }
     }
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {

@@ -9,10 +9,13 @@
 #include "lab/estimate/distortion.h"
 #include "lab/estimate/harmonics.h"
 #include "lab/estimate/inputs.h"
+#include "lab/estimate/oscillation.h"
 #include "lab/estimate/periodic.h"
 #include "lab/estimate/repetition.h"
+#include "lab/estimate/smoothness.h"
 #include "lab/page/page.h"
 #include "lab/record/frf_file.h"
+#include "tools/servoscope/remarks.h"
 
 #include <cjson/cJSON.h>
 #include <stdbool.h>
@@ -28,9 +31,11 @@ struct estimating_findings {
     struct distortion distortion;
     size_t harmonics_count; ///< one for each recording with a single line
     struct harmonics *harmonics;
-    double foreign_share;    ///< inputs.h; 0 with one input
-    struct agreement agreed; ///< of realisations; lines 0: there is only one
-    char load_column[40];    ///< measured at the load, and not what was asked for; "" if there is none
+    struct oscillation oscillation; ///< the strongest one
+    double foreign_share;           ///< inputs.h; 0 with one input
+    struct agreement agreed;        ///< of realisations; lines 0: there is only one
+    struct smoothness smoothness;   ///< of the final response; lines 0: not looked at
+    char load_column[40];           ///< measured at the load, and not what was asked for; "" if there is none
 };
 
 /// Looks at one recording whose response has been estimated, and fills in the response's distortion columns. `inputs`
@@ -41,10 +46,15 @@ bool estimating_findings_measure(const struct periodic *recording, const struct 
 /// Adds those of another recording. Errors: false if memory is short.
 bool estimating_findings_merge(struct estimating_findings *self, const struct estimating_findings *other);
 
+/// Looks at the final response: whether its lines scatter as its std says. A model's do not. Errors: false if memory is
+/// short.
+bool estimating_findings_judge(struct estimating_findings *self, const struct frf *frf);
+
 /// Adds to the final response what docs/files.md calls the keys of distortion. Errors: false if memory is short.
 bool estimating_findings_set_keys(const struct estimating_findings *self, struct frf *io_frf);
 
-void estimating_findings_print(const struct estimating_findings *self, const struct frf *frf);
+/// Says it to a person: lines of the response that remarks_about() has set.
+void estimating_findings_say(const struct estimating_findings *self, const struct frf *frf, struct remarks *io_remarks);
 void estimating_findings_add_json(const struct estimating_findings *self, const struct frf *frf, cJSON *io_object);
 
 /// Adds the section of lab/estimate/report_distortion.h.

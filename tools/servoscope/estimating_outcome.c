@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 #include "tools/servoscope/estimating_outcome.h"
 
+#include "tools/servoscope/estimating_model.h"
+
 #include "lab/estimate/method.h"
-#include "lab/estimate/report.h"
 #include "lab/numeric/statistics.h"
-#include "lab/page/page.h"
-#include "lab/record/atomic_file.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 static size_t valid_lines(const struct frf *frf)
 {
@@ -57,81 +57,138 @@ static double median_coherence(const struct frf *frf)
     return best;
 }
 
-static void print_periods(const char *path, const struct estimating_summary *run)
+static void say_settling(const struct estimating_summary *run, struct remarks *io_remarks)
 {
-    printf("%s: %zu of %zu periods of %zu samples count, %zu left out for settling", path, run->used, run->total,
-           run->period_samples, run->settle);
-    if (run->lost > 0) {
-        printf(", %zu for lost samples (the first in row %zu)", run->lost, run->first_lost_row);
+    char decay[80] = "";
+    if (run->total < 4) {
+        remarks_add(io_remarks, remark_fact, "settling", "%zu periods are too few to judge the settling", run->total);
+        return;
     }
-    printf("%s%s\n", run->period_found ? "; period found by its repetition" : "",
-           run->bins_found ? "; lines found by their power" : "");
-    printf("  output differs from the later half by %.3g of its size in the first period, by %.3g in the last",
-           run->first_level, run->last_level);
     if (run->transient.decay_per_period > 0.0) {
-        printf("; a transient falls to %.3g per period", run->transient.decay_per_period);
+        snprintf(decay, sizeof decay, "; a transient falls to %.3g per period", run->transient.decay_per_period);
     }
-    if (!run->transient.settled) {
-        printf(run->total < 4 ? "; too few periods to judge the settling"
-                              : "; the first half has not settled or is not repeatable");
-    }
-    putchar('\n');
-    if (run->leading_periods > 0) {
-        printf("  read piece by piece: what else is said of it is of its first %zu periods\n", run->leading_periods);
-    }
+    remarks_add(io_remarks, remark_fact, "settling",
+                "output differs from the later half by %.3g of its size in the first period, by %.3g in the last%s%s",
+                run->first_level, run->last_level, decay,
+                run->transient.settled ? "" : "; the first half has not settled or is not repeatable");
 }
 
-static void print_segments(const char *path, const struct estimating_summary *run)
+static void say_periods(const struct estimating_summary *run, struct remarks *io_remarks)
 {
-    printf("%s: %s, %zu of %zu segments, %zu to %zu periods of %zu samples count", path, run->segments.kind,
-           run->segments.used, run->segments.planned, run->used, run->used_most, run->period_samples);
+    char lost[96] = "";
     if (run->lost > 0) {
-        printf(", %zu were left out for lost samples", run->lost);
+        snprintf(lost, sizeof lost, ", %zu for lost samples (the first in row %zu)", run->lost, run->first_lost_row);
     }
-    putchar('\n');
-    if (run->segments.missing[0] != '\0') {
-        printf("  segments %s are missing: the measurement ended early\n", run->segments.missing);
+    remarks_add(io_remarks, remark_fact, "periods",
+                "%zu of %zu periods of %zu samples count, %zu left out for settling%s%s%s", run->used, run->total,
+                run->period_samples, run->settle, lost, run->period_found ? "; period found by its repetition" : "",
+                run->bins_found ? "; lines found by their power" : "");
+    /* One bin in a hundred is by chance. */
+    if (run->doubtful > run->period_samples / 64 + 2) {
+        remarks_add(io_remarks, remark_fact, "doubtful_lines",
+                    "%zu more bins may be lines, which noise or stronger ones hide: they count neither as lines nor as "
+                    "distortion; --lines would say",
+                    run->doubtful);
     }
-    printf("  output differs from the later half by at most %.3g of its size in a segment's last period%s\n",
-           run->last_level, run->transient.settled ? "" : "; that one has not settled or is not repeatable");
+    say_settling(run, io_remarks);
+    if (run->leading_periods > 0) {
+        remarks_add(io_remarks, remark_fact, "pieces",
+                    "read piece by piece: what else is said of it is of its first %zu periods", run->leading_periods);
+    }
 }
 
-static void print_run(const char *path, const struct estimating_summary *run)
+static void say_segments(const struct estimating_summary *run, struct remarks *io_remarks)
+{
+    char lost[64] = "";
+    if (run->lost > 0) {
+        snprintf(lost, sizeof lost, ", %zu were left out for lost samples", run->lost);
+    }
+    remarks_add(io_remarks, remark_fact, "segments",
+                "%s, %zu of %zu segments, %zu to %zu periods of %zu samples count%s", run->segments.kind,
+                run->segments.used, run->segments.planned, run->used, run->used_most, run->period_samples, lost);
+    if (run->segments.missing[0] != '\0') {
+        remarks_add(io_remarks, remark_warning, "segments_missing",
+                    "segments %s are missing: the measurement ended early", run->segments.missing);
+    }
+    remarks_add(io_remarks, remark_fact, "settling",
+                "output differs from the later half by at most %.3g of its size in a segment's last period%s",
+                run->last_level, run->transient.settled ? "" : "; that one has not settled or is not repeatable");
+}
+
+static void say_rows(const struct estimating_summary *run, struct remarks *io_remarks)
+{
+    char lost[48] = "";
+    if (run->lost_rows > 0) {
+        snprintf(lost, sizeof lost, ", %zu rows lost", run->lost_rows);
+    }
+    remarks_add(io_remarks, remark_fact, "rows", "no period; %zu rows in one piece%s", run->rows, lost);
+}
+
+static void say_run(const struct estimating_summary *run, struct remarks *io_remarks)
 {
     if (run->segments.planned > 0) {
-        print_segments(path, run);
+        say_segments(run, io_remarks);
     } else if (run->without_period) {
-        printf("%s: no period; %zu rows in one piece", path, run->rows);
-        if (run->lost_rows > 0) {
-            printf(", %zu rows lost", run->lost_rows);
-        }
-        putchar('\n');
+        say_rows(run, io_remarks);
     } else {
-        print_periods(path, run);
+        say_periods(run, io_remarks);
     }
-    estimating_checks_print(&run->checks);
-    printf("  %s\n", run->advice.sentence);
+    estimating_checks_say(&run->checks, io_remarks);
+    remarks_add(io_remarks, remark_advice, "method", "%s", run->advice.sentence);
 }
 
-static void print_summary(const char *path, const struct estimating_outcome *outcome)
+/// What the response includes and what was taken out of it.
+static void say_setup(const struct frf *frf, struct remarks *io_remarks)
+{
+    const double removed_s = atof(estimate_key(frf, "delay_removed_s"));
+    const bool held = strcmp(estimate_key(frf, "hold"), "zoh") == 0;
+    char delay[64] = "";
+    if (removed_s != 0.0) {
+        snprintf(delay, sizeof delay, "; a delay of %.6g ms is taken out", 1e3 * removed_s);
+    }
+    remarks_add(io_remarks, remark_fact, "setup", "%s; actuator %s%s",
+                held ? "with the hold between samples (zoh)" : "input measured behind an anti-alias filter",
+                estimate_key(frf, "actuator"), delay);
+}
+
+static void say_response(const struct estimating_outcome *outcome, struct remarks *io_remarks)
 {
     const struct frf *frf = &outcome->frf;
-    printf("%s: %s to %s by method %s, %zu of %zu lines valid, %.6g..%.6g Hz\n", path, frf->input, frf->output,
-           frf->method, valid_lines(frf), frf->count, frf->frequency_hz[0], frf->frequency_hz[frf->count - 1]);
-    printf("  std/|G| %.3g (median); 95 %% of errors lie within %s std (%.3g degrees of freedom)\n",
-           median_relative_std(frf), estimate_key(frf, "confidence_95_factor"), frf->degrees_of_freedom);
-    double coherence = median_coherence(frf);
+    const double coherence = median_coherence(frf);
+    remarks_add(io_remarks, remark_fact, "response", "%s to %s by method %s, %zu of %zu lines valid, %.6g..%.6g Hz",
+                frf->input, frf->output, frf->method, valid_lines(frf), frf->count, frf->frequency_hz[0],
+                frf->frequency_hz[frf->count - 1]);
+    remarks_add(io_remarks, remark_fact, "uncertainty",
+                "std/|G| %.3g (median); 95 %% of errors lie within %s std (%.0f degrees of freedom)",
+                median_relative_std(frf), estimate_key(frf, "confidence_95_factor"), frf->degrees_of_freedom);
     if (coherence >= 0.0) {
-        printf("  coherence %.4g (median)\n", coherence);
+        remarks_add(io_remarks, remark_fact, "coherence", "coherence %.4g (median)", coherence);
     }
     if (estimate_key(frf, "lpm_order")[0]) {
-        printf("  polynomials of order %s over %s lines on each side\n", estimate_key(frf, "lpm_order"),
-               estimate_key(frf, "lpm_half_width"));
+        remarks_add(io_remarks, remark_fact, "polynomials", "polynomials of order %s over %s lines on each side",
+                    estimate_key(frf, "lpm_order"), estimate_key(frf, "lpm_half_width"));
     }
     if (estimate_key(frf, "warning")[0]) {
-        printf("  warning: %s\n", estimate_key(frf, "warning"));
+        remarks_add(io_remarks, remark_warning, "bias", "%s", estimate_key(frf, "warning"));
     }
-    estimating_findings_print(&outcome->findings, frf);
+    if (estimate_key(frf, "columns_named")[0]) {
+        remarks_add(io_remarks, remark_fact, "columns", "columns were named by the units in their names: --map %s",
+                    estimate_key(frf, "columns_named"));
+    }
+    say_setup(frf, io_remarks);
+    estimating_model_say(outcome, io_remarks);
+    estimating_findings_say(&outcome->findings, frf, io_remarks);
+}
+
+void estimating_outcome_say(const struct estimating_outcome *outcome, const struct option_values *sources,
+                            const char *out, struct remarks *io_remarks)
+{
+    for (size_t r = 0; r < sources->count; r++) {
+        remarks_about(io_remarks, sources->items[r]);
+        say_run(&outcome->runs[r], io_remarks);
+    }
+    remarks_about(io_remarks, out);
+    say_response(outcome, io_remarks);
 }
 
 static cJSON *json_of_run(const char *path, const struct estimating_summary *run)
@@ -205,46 +262,56 @@ cJSON *estimating_outcome_json(const struct estimating_outcome *outcome, const s
     cJSON_AddStringToObject(object, "suited_method", runs[0].advice.method);
     cJSON_AddStringToObject(object, "advice", runs[0].advice.sentence);
     add_method_keys(frf, object);
+    estimating_model_add_json(outcome, object);
     estimating_findings_add_json(&outcome->findings, frf, object);
     cJSON *list = cJSON_AddArrayToObject(object, "runs");
     for (size_t r = 0; r < sources->count; r++) {
         cJSON_AddItemToArray(list, json_of_run(sources->items[r], &runs[r]));
     }
+    struct remarks remarks = {.count = 0};
+    estimating_outcome_say(outcome, sources, out, &remarks);
+    remarks_add_json(&remarks, object);
+    remarks_free(&remarks);
     return object;
-}
-
-int estimating_outcome_write_page(const char *path, const struct estimating_outcome *outcomes, size_t count,
-                                  struct error *out_error)
-{
-    struct atomic_file file;
-    struct page page;
-    FILE *stream = atomic_file_open(&file, path, out_error);
-    if (!stream) {
-        return error_refused;
-    }
-    page_start(&page, stream, "Frequency response", NULL);
-    for (size_t i = 0; i < count; i++) {
-        frf_report_section(&page, &outcomes[i].frf, NULL);
-        estimating_findings_add_page(&outcomes[i].findings, &outcomes[i].frf, &page);
-    }
-    page_end(&page, NULL);
-    return atomic_file_commit(&file, out_error);
 }
 
 void estimating_outcome_print(const struct estimating_outcome *outcome, const struct option_values *sources,
                               const char *out)
 {
-    for (size_t r = 0; r < sources->count; r++) {
-        print_run(sources->items[r], &outcome->runs[r]);
-    }
-    print_summary(out, outcome);
+    struct remarks remarks = {.count = 0};
+    estimating_outcome_say(outcome, sources, out, &remarks);
+    remarks_print(&remarks);
+    remarks_free(&remarks);
+}
+
+bool estimating_summary_excite(struct estimating_summary *io_summary, const struct periodic *recording)
+{
+    struct excitation one;
+    const bool done = excitation_take(recording, &one) && excitations_add(&io_summary->excitations, &one);
+    excitation_free(&one);
+    return done;
+}
+
+void estimating_summary_drop(struct estimating_summary *self)
+{
+    free(self->levels);
+    free(self->parametric);
+    frf_free(&self->measured);
+    excitations_free(&self->excitations);
+    self->levels = NULL;
+    self->parametric = NULL;
 }
 
 void estimating_outcome_free(struct estimating_outcome *self)
 {
     for (size_t r = 0; r < self->run_count; r++) {
         estimating_findings_free(&self->runs[r].findings);
+        estimating_summary_drop(&self->runs[r]);
     }
+    for (size_t r = 0; r < self->run_count && self->responses; r++) {
+        frf_free(&self->responses[r]);
+    }
+    free(self->responses);
     free(self->runs);
     estimating_findings_free(&self->findings);
     frf_free(&self->frf);

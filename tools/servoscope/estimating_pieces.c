@@ -91,7 +91,8 @@ static int find_in_leading(const struct run *run, const struct periodic_options 
         estimate_advise(&clocked.recording, &io_summary->advice);
         io_summary->leading_periods = clocked.recording.total;
         if (!estimating_findings_measure(&clocked.recording, inputs, out_frf, &io_summary->findings) ||
-            !estimating_checks_measure(&clocked, out_frf, &io_summary->checks)) {
+            !estimating_checks_measure(&clocked, out_frf, &io_summary->checks) ||
+            !estimating_summary_excite(io_summary, &clocked.recording)) {
             status = estimate_refuse_memory(out_frf, out_error);
         }
     }
@@ -128,6 +129,7 @@ static void summarise(const struct periodic *leading, const struct online_result
     io_summary->period_samples = leading->period_samples;
     io_summary->period_found = leading->period_found;
     io_summary->bins_found = leading->bins_found;
+    io_summary->doubtful = leading->doubtful_count;
     io_summary->total = result->total;
     io_summary->settle = result->settle;
     io_summary->lost = result->lost;
@@ -206,6 +208,7 @@ static int estimate_part(const struct run *part, const struct periodic_options *
         io_summary->period_samples = recording->period_samples;
         io_summary->period_found = recording->period_found;
         io_summary->bins_found = recording->bins_found;
+        io_summary->doubtful = recording->doubtful_count;
         io_summary->settle = recording->settle;
         io_summary->transient = recording->transient;
         io_summary->first_level = recording->output_level[0];
@@ -329,7 +332,9 @@ int estimating_pieces_estimate(struct estimating_pieces *self, const struct peri
     } else if (!status) {
         status = estimate_online(self, options, out_frf, out_summary, out_error);
     }
-    if (!status && !copy_findings(&found, &out_summary->checks, out_frf)) {
+    if (!status && !(copy_findings(&found, &out_summary->checks, out_frf) &&
+                     (out_summary->leading_periods == 0 ||
+                      estimate_set_key(out_frf, "leading_periods", "%zu", out_summary->leading_periods)))) {
         status = estimate_refuse_memory(out_frf, out_error);
     }
     frf_free(&found);

@@ -31,6 +31,10 @@ static bool is_among(const char *path, const char *const *others, size_t count)
 
 static int check_folder(const char *path, struct error *out_error)
 {
+    struct stat file;
+    if (stat(path, &file) == 0 && S_ISDIR(file.st_mode)) {
+        return error_set(out_error, error_refused, "%s: is a folder, a file name was expected", path);
+    }
     const char *slash = strrchr(path, '/');
     size_t length = slash ? (size_t)(slash - path) : 0;
     char *folder = malloc(length + 2);
