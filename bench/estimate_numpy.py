@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""The numpy side of bench/estimate.sh: times it, compares results, prints the table. usage: estimate_numpy.py FOLDER"""
+"""The numpy side of bench/estimate.sh: times it, compares results; in the last round prints the table.
+usage: estimate_numpy.py FOLDER ROUND"""
 import json
 import sys
 import time
@@ -8,6 +9,7 @@ import time
 import numpy as np
 
 ORDER, HALF_WIDTH = 2, 6
+ROUNDS = 3
 
 
 def mean(u, y, lines, settle):
@@ -77,39 +79,61 @@ def timed(function, repeats):
     return best, result
 
 
+def measure(case, ours):
+    """Seconds and result of each way numpy has of doing this case, with what is required and a remark."""
+    N, P, lines = ours["period_samples"], ours["periods"], ours["lines"]
+    u, y = np.fromfile(case + ".f64").reshape(2, P, N)
+    if ours["method"] == "mean":
+        return [(*timed(lambda: mean(u, y, lines, ours["settle"]), 15), 1.0, "rfft over periods")]
+    return [(*timed(lambda: lpm_loop(u, y, lines), 1), 10.0 if P <= 8 else None, "least squares per line"),
+            (*timed(lambda: lpm_matrix(u, y, lines), 5), None, "one matrix product for all lines")]
+
+
+def best_of_rounds(folder, name, row, seconds):
+    """The least of this and of the rounds before."""
+    path = f"{folder}/{name}-{row}-seconds"
+    try:
+        with open(path, encoding="utf-8") as stream:
+            seconds = min(seconds, float(stream.read()))
+    except FileNotFoundError:
+        pass
+    with open(path, "w", encoding="utf-8") as stream:
+        stream.write(repr(seconds))
+    return seconds
+
+
 def main():
-    folder = sys.argv[1]
-    print(f"numpy {np.__version__}; seconds of processor time, best of several; ratio: numpy over ours")
-    print(f"{'method':6} {'N':>6} {'P':>4} {'lines':>6} {'ours':>9} {'numpy':>9} {'ratio':>7} {'required':>9} "
-          f"{'largest difference':>19}  remark")
+    folder, last = sys.argv[1], int(sys.argv[2]) == ROUNDS
+    if last:
+        print(f"numpy {np.__version__}; seconds of processor time, best of several; ratio: numpy over ours")
+        print(f"{'method':6} {'N':>6} {'P':>4} {'lines':>6} {'ours':>9} {'numpy':>9} {'ratio':>7} {'required':>9} "
+              f"{'largest difference':>19}  remark")
     missed = []
     growth = {}
-    for line in open(f"{folder}/times", encoding="utf-8"):
+    for line in open(f"{folder}/times-{sys.argv[2]}", encoding="utf-8"):
         ours = json.loads(line)
-        N, P, lines, seconds = ours["period_samples"], ours["periods"], ours["lines"], ours["seconds"]
-        case = f"{folder}/{ours['method']}-{N}-{P}"
-        u, y = np.fromfile(case + ".f64").reshape(2, P, N)
-        real, imaginary, std = np.fromfile(case + "-result.f64").reshape(3, lines)
-        if ours["method"] == "mean":
-            rows = [(*timed(lambda: mean(u, y, lines, ours["settle"]), 15), 1.0, "rfft over periods")]
-        else:
-            rows = [(*timed(lambda: lpm_loop(u, y, lines), 1), 10.0 if P <= 8 else None, "least squares per line"),
-                    (*timed(lambda: lpm_matrix(u, y, lines), 5), None, "one matrix product for all lines")]
-        growth.setdefault(ours["method"], []).append((N * P, seconds))
-        for time_s, (G, s), required, remark in rows:
+        N, P, lines = ours["period_samples"], ours["periods"], ours["lines"]
+        name = f"{ours['method']}-{N}-{P}"
+        seconds = best_of_rounds(folder, name, "ours", ours["seconds"])
+        real, imaginary, std = np.fromfile(f"{folder}/{name}-result.f64").reshape(3, lines)
+        growth.setdefault(ours["method"], []).append((N, P, seconds))
+        for row, (time_s, (G, s), required, remark) in enumerate(measure(f"{folder}/{name}", ours)):
+            time_s = best_of_rounds(folder, name, row, time_s)
             difference = float("nan")
             if len(G) == lines:
                 difference = max(np.max(abs(real + 1j * imaginary - G) / abs(G)), np.max(abs(std / s - 1)))
                 if not difference <= 1e-9:
-                    missed.append(f"{ours['method']} N = {N}: results differ by {difference:.2g}")
+                    missed.append(f"{name}: results differ by {difference:.2g}")
+            if not last:
+                continue
             if required and time_s / seconds < required:
-                missed.append(f"{ours['method']} N = {N}: ratio {time_s / seconds:.3g}")
+                missed.append(f"{name}: ratio {time_s / seconds:.3g}")
             print(f"{ours['method']:6} {N:6} {P:4} {lines:6} {seconds:9.5f} {time_s:9.5f} {time_s / seconds:7.2f} "
                   f"{'>= %g' % required if required else '':>9} {difference:19.2g}  {remark}")
-    for method, points in growth.items():
-        nanoseconds = ", ".join(f"{1e9 * s / rows:.2f}" for rows, s in points)
-        print(f"growth: {method} takes {nanoseconds} ns per row (both columns) at {', '.join(str(r) for r, _ in points)} rows")
-    if missed:
+    for method, points in growth.items() if last else ():
+        rows = ", ".join(f"{1e9 * s / (N * P):.2f} ({N} x {P})" for N, P, s in points)
+        print(f"growth: {method} takes, in ns per row (both columns): {rows}")
+    if last and missed:
         sys.exit("missed: " + "; ".join(missed))
 
 

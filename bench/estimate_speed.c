@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /// Times method mean and method lpm on recordings that it writes for numpy too (bench/estimate.sh).
 /// usage: estimate_speed FOLDER
-/// For every case METHOD-N-PERIODS a file .f64 with input then output, periods x N doubles each, and one -result.f64
-/// with real, imaginary part and standard deviation, lines each; on standard output one line of JSON per case.
+/// For every case METHOD-N-PERIODS a file .f64 with input then output, periods x N doubles each (unless it is there from
+/// the run before), and one -result.f64 with real, imaginary part and standard deviation, lines each; on standard output
+/// one line of JSON per case.
 #include "lab/estimate/frf_lpm.h"
 #include "lab/estimate/frf_mean.h"
 #include "lab/numeric/fft.h"
@@ -14,7 +15,7 @@
 #include <string.h>
 #include <time.h>
 
-enum { repeats = 15, sizes = 4, rows_at_least = 2000000, lpm_periods = 8, many_periods = 200 };
+enum { repeats = 15, rows_at_least = 2000000, lpm_periods = 8, many_periods = 200 };
 
 static const double two_pi = 6.283185307179586476925;
 
@@ -87,7 +88,12 @@ static void write_doubles(const char *folder, const char *name, const double *co
 {
     char path[1024];
     snprintf(path, sizeof path, "%s/%s.f64", folder, name);
-    FILE *stream = fopen(path, "wb");
+    FILE *stream = fopen(path, "rb");
+    if (stream) {
+        fclose(stream);
+        return;
+    }
+    stream = fopen(path, "wb");
     for (size_t i = 0; i < part_count; i++) {
         if (!stream || fwrite(parts[i], sizeof(double), count, stream) != count) {
             stop("cannot write");
@@ -144,13 +150,21 @@ static void measure(const char *folder, const char *method, estimator *estimate,
 
 int main(int argc, char **argv)
 {
-    static const size_t lengths[sizes] = {2000, 10000, 16384, 65536};
+    /* Multiples of four with small prime factors; a prime, one with many factors, an odd one and one twice an odd one. */
+    static const size_t lengths[] = {2000, 10000, 16384, 65536, 10007, 10010, 3125, 1250};
+    enum { sizes = sizeof lengths / sizeof lengths[0], with_lpm = 4 };
+    static const size_t few_periods[] = {3, 6, 20};
     if (argc != 2) {
         stop("expected one folder");
     }
     for (size_t i = 0; i < sizes; i++) {
         measure(argv[1], "mean", frf_mean_estimate, lengths[i], rows_at_least / lengths[i] + 2, 1);
-        measure(argv[1], "lpm", frf_lpm_estimate, lengths[i], lpm_periods, 0);
+        if (i < with_lpm) {
+            measure(argv[1], "lpm", frf_lpm_estimate, lengths[i], lpm_periods, 0);
+        }
+    }
+    for (size_t i = 0; i < sizeof few_periods / sizeof few_periods[0]; i++) {
+        measure(argv[1], "mean", frf_mean_estimate, lengths[1], few_periods[i], 1);
     }
     /* Many periods and few lines: numpy's cost is in the lines, ours in the rows. */
     measure(argv[1], "lpm", frf_lpm_estimate, lengths[0], many_periods, 0);

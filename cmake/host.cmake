@@ -30,7 +30,7 @@ servoscope_room(numeric lab/numeric EXTRA ${PROJECT_SOURCE_DIR}/lab/numeric/fft.
 # The innermost loops of a transform are nine tenths of every design's time, and twenty times slower without inlining and
 # with every access checked; tests/unit/test_fft.c guards the borders of their buffers.
 set_source_files_properties(lab/numeric/fft_portable.cpp lab/numeric/fft_avx2.cpp
-  PROPERTIES COMPILE_OPTIONS "-O2;-fno-sanitize=all")
+  PROPERTIES COMPILE_OPTIONS "-O3;-fno-sanitize=all")
 
 file(GLOB format_files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/lab/record/format_*.c)
 servoscope_registry(${PROJECT_BINARY_DIR}/generated/formats.c "struct record_format" record_ record_formats

@@ -200,17 +200,14 @@ double blackbox_gain(const struct blackbox *self, const struct fit_data *data, c
     double cost = fit->cost;
     if (A) {
         double *b = A + rows * most, *weight = b + rows, *centre = weight + most, *x = centre + most;
-        memcpy(A, fit->jacobian, rows * m * sizeof *A);
-        for (size_t i = 0; i < m; i++) {
-            weight[i] = hypothesis->coordinates[i].weight;
-            centre[i] = hypothesis->coordinates[i].centre - hypothesis->x[i];
-        }
+        fit_linear(fit, data, hypothesis, A, weight, centre);
         for (int group = 0; group < blackbox_groups; group++)
             if (mask >> group & 1)
                 m = take_group(self, rows, group, m, A, weight);
         for (size_t j = 0; j < rows; j++)
             b[j] = -fit->residual[j];
-        double left = solve_rest(rows, m, A, weight, centre, x, b);
+        // The prior at the fit is in its cost already; what contrasts add, a black box does not change.
+        double left = solve_rest(rows, m, A, weight, centre, x, b) + fit_contrast_cost(fit, data);
         if (left < cost) {
             cost = left;
             for (size_t j = 0; out_left && j < rows; j++)

@@ -21,6 +21,7 @@ struct work {
     struct evidence *evidence;    ///< likewise
     struct fit_data fit_data, validate_data;
     struct run parts[2]; ///< of a run of which a part is held back; columns borrow the run's values
+    size_t held_from;    ///< row at which the part begins that is held back
     struct fit fit;
 };
 
@@ -64,9 +65,9 @@ static bool hold_back(const struct run *run, struct work *w)
         size_t counted = periods - settle, held = counted / 3;
         size_t from = (periods - held - 1) * n; // one period more, to lead into the first that counts
         return run_part(run, 0, (periods - held) * n, settle, &w->parts[0]) &&
-               run_part(run, from, (held + 1) * n, 1, &w->parts[1]);
+               run_part(run, w->held_from = from, (held + 1) * n, 1, &w->parts[1]);
     }
-    size_t rows = run->rows / 3 * 2;
+    size_t rows = w->held_from = run->rows / 3 * 2;
     return run_part(run, 0, rows, 0, &w->parts[0]) && run_part(run, rows, run->rows - rows, 0, &w->parts[1]);
 }
 
@@ -82,6 +83,21 @@ static int check_alike(const struct run *run, const struct recording *r, const s
                      first->rate_hz, first->linear ? "linear" : "rotary", first_reference ? "with" : "without");
 }
 
+/// Recording number i: fit runs, then validation runs, of which the only one may be the end of the first fit run.
+static int prepare_one(const struct diagnosis_request *request, struct work *w, bool held_back, size_t i,
+                       struct error *out_error)
+{
+    const struct run *run = i < w->fit_count ? &request->fit[i] : &request->validate[i - w->fit_count];
+    if (held_back && (i == 0 || i == w->fit_count))
+        run = &w->parts[i == 0 ? 0 : 1];
+    int status = recording_prepare(run, &w->recordings[i], out_error);
+    if (status != 0)
+        return status;
+    if (held_back && i == w->fit_count)
+        recording_begin(&w->recordings[i], (double)w->held_from / run->sample_rate_hz);
+    return check_alike(run, &w->recordings[i], &request->fit[0], &w->recordings[0], out_error);
+}
+
 static int prepare_recordings(const struct diagnosis_request *request, struct work *w, struct diagnosis *d,
                               struct error *out_error)
 {
@@ -94,12 +110,7 @@ static int prepare_recordings(const struct diagnosis_request *request, struct wo
     if (!w->recordings || !w->evidence || (d->held_back && !hold_back(&request->fit[0], w)))
         return error_set(out_error, error_refused, "not enough memory");
     for (size_t i = 0; i < count; i++) {
-        const struct run *run = i < w->fit_count ? &request->fit[i] : &request->validate[i - w->fit_count];
-        if (d->held_back && (i == 0 || i == w->fit_count))
-            run = &w->parts[i == 0 ? 0 : 1];
-        int status = recording_prepare(run, &w->recordings[i], out_error);
-        if (status == 0)
-            status = check_alike(run, &w->recordings[i], &request->fit[0], &w->recordings[0], out_error);
+        int status = prepare_one(request, w, d->held_back, i, out_error);
         if (status != 0)
             return status;
     }
@@ -141,6 +152,19 @@ static int choose_model(const struct diagnosis_request *request, const struct re
     return 0;
 }
 
+/// What is odd about the recordings, and whether they can be of the drive that the model is of.
+static int look_at_oddities(const struct diagnosis_request *request, const struct work *w, struct diagnosis *d,
+                            struct error *out_error)
+{
+    for (size_t i = 0; i < w->fit_count + w->validate_count; i++) {
+        const struct oddities *odd = &w->recordings[i].oddities;
+        for (size_t j = 0; j < odd->count; j++)
+            oddities_add(&d->oddities, "%s", odd->texts[j]);
+    }
+    double inertia = d->model_given ? d->given.motor_inertia_kgm2 + d->given.load_inertia_kgm2 : 0.0;
+    return oddities_of_inertia(&request->fit[0], &w->recordings[0], inertia, &d->oddities, out_error);
+}
+
 static int prepare_evidence(struct work *w, const struct diagnosis *d, struct error *out_error)
 {
     double inertia = d->given.motor_inertia_kgm2 + d->given.load_inertia_kgm2;
@@ -149,10 +173,17 @@ static int prepare_evidence(struct work *w, const struct diagnosis *d, struct er
             return error_set(out_error, error_refused, "not enough memory");
     w->fit_data = (struct fit_data){.runs = w->fit_count, .evidence = w->evidence};
     w->validate_data = (struct fit_data){.runs = w->validate_count, .evidence = w->evidence + w->fit_count};
-    for (size_t i = 0; i < w->fit_count; i++)
+    for (size_t i = 0; i < w->fit_count; i++) {
         w->fit_data.values += w->evidence[i].values;
-    for (size_t i = 0; i < w->validate_count; i++)
-        w->validate_data.values += w->evidence[w->fit_count + i].values;
+        w->fit_data.contrasts += w->evidence[i].contrast.values;
+        w->evidence[i].phase_free = i > 0;
+    }
+    for (size_t i = 0; i < w->validate_count; i++) {
+        struct evidence *e = &w->evidence[w->fit_count + i];
+        w->validate_data.values += e->values;
+        w->validate_data.contrasts += e->contrast.values;
+        e->phase_free = true;
+    }
     if (!fit_init(&w->fit, &w->fit_data))
         return error_set(out_error, error_refused, "not enough memory");
     return 0;
@@ -164,6 +195,22 @@ static bool estimate_noise(struct evidence *evidence, size_t count, const struct
     for (size_t i = 0; i < count; i++)
         good = evidence_estimate_noise(&evidence[i], model) && good;
     return good;
+}
+
+/// The noise of the fit runs under a model, and what lines it leaves: where a search for a disturbance begins.
+static bool estimate_fit_noise(struct work *w, const struct sim_model *model)
+{
+    struct sim_coverage *coverage = &w->recordings[0].coverage;
+    if (!estimate_noise(w->evidence, w->fit_count, model))
+        return false;
+    // Those found before stay behind the new ones: a line that the model has by now is not seen any more.
+    double before[sim_tones_max];
+    size_t fresh = w->evidence[0].tone_count, old = coverage->tone_count;
+    memcpy(before, coverage->tones_hz, sizeof before);
+    memcpy(coverage->tones_hz, w->evidence[0].tones_hz, sizeof before);
+    coverage->tone_count = fresh + old < sim_tones_max ? fresh + old : sim_tones_max;
+    memcpy(coverage->tones_hz + fresh, before, (coverage->tone_count - fresh) * sizeof *before);
+    return true;
 }
 
 static bool tell(const struct diagnosis_request *request, const char *what)
@@ -221,9 +268,9 @@ static bool find_causes(const struct diagnosis_request *request, struct work *w,
 {
     struct sim_model model = d->given;
     hypothesis_init(h, &d->given, !d->model_given, w->recordings[0].block.torque_ref != NULL);
+    h->sensors_seen = w->evidence[0].kinematics.values > 0;
     for (int pass = 0; pass < 2; pass++) {
-        if (!estimate_noise(w->evidence, w->fit_count, &model) ||
-            !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
+        if (!estimate_fit_noise(w, &model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
             !fit_run(&w->fit, &w->fit_data, h, refit_iterations))
             return false;
         hypothesis_model(h, NULL, &model);
@@ -232,17 +279,46 @@ static bool find_causes(const struct diagnosis_request *request, struct work *w,
     struct search_options options = {.causes_max = 6, .progress = request->progress, .user = request->user};
     for (int pass = 0; pass < 4; pass++) {
         struct hypothesis before = *h;
-        if (!estimate_noise(w->evidence, w->fit_count, &model) ||
-            !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
+        if (!estimate_fit_noise(w, &model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
             !search_run(&w->fit_data, &w->recordings[0].coverage, &options, h, &w->fit))
             return false;
         hypothesis_model(h, NULL, &model);
         if (same_names(&before, h))
             break;
     }
+    // Effects in time are linear about the model that the noise was estimated with: once more, from where they are now.
+    for (int pass = 0; contrast_concerns(&model) && pass < 2; pass++) {
+        if (!estimate_fit_noise(w, &model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
+            !fit_run(&w->fit, &w->fit_data, h, refit_iterations))
+            return false;
+        hypothesis_model(h, NULL, &model);
+    }
     d->extended_model = model;
     d->fit_misfit = w->fit.cost / (double)w->fit_data.values;
     return true;
+}
+
+/// What was found in the rows themselves is no hypothesis of the fit.
+static void add_finding(const struct recording *r, struct diagnosis *d)
+{
+    const struct repair_finding *f = &r->finding;
+    if (f->effect < 0 || d->cause_count == diagnosis_causes_max)
+        return;
+    struct diagnosis_cause *cause = &d->causes[d->cause_count++];
+    memset(cause, 0, sizeof *cause);
+    cause->effect = f->effect;
+    cause->evidence = f->evidence;
+    memcpy(cause->values, f->values, sizeof cause->values);
+    memcpy(cause->deviations, f->deviations, sizeof cause->deviations);
+    struct sim_finding finding = {cause->values, cause->deviations, cause->nominal, d->linear};
+    sim_effects[f->effect]->say(&finding, cause->says, sizeof cause->says);
+    d->extended_model.effect_on[f->effect] = true;
+    memcpy(d->extended_model.effect_parameters[f->effect], f->values, sizeof f->values);
+    for (size_t i = 0; i < sim_effects[f->effect]->parameter_count; i++) {
+        const struct sim_parameter *p = &sim_effects[f->effect]->parameters[i];
+        model_deviations_add(&d->deviations, sim_effects[f->effect]->id, d->linear ? p->linear_name : p->name,
+                             f->deviations[i]);
+    }
 }
 
 static void describe_cause(const struct work *w, const struct diagnosis *d, const struct hypothesis *h, int effect,
@@ -282,6 +358,7 @@ static void list_causes(const struct work *w, struct diagnosis *d, const struct 
         if (*count < diagnosis_causes_max)
             describe_cause(w, d, h, e, &list[(*count)++]);
     }
+    add_finding(&w->recordings[0], d);
     qsort(d->causes, d->cause_count, sizeof d->causes[0], stronger);
     qsort(d->candidates, d->candidate_count, sizeof d->candidates[0], stronger);
 }
@@ -293,7 +370,7 @@ static void list_untestable(const struct work *w, struct diagnosis *d, const str
     for (int e = 0; sim_effects[e]; e++) {
         struct diagnosis_untestable *u = &d->untestable[d->untestable_count];
         u->effect = e;
-        if (h->named[e])
+        if (h->named[e] || sim_effects[e]->notice)
             continue;
         if (sim_effects[e]->place == sim_place_actuator && !h->actuator_seen)
             snprintf(u->why, sizeof u->why, "no torque reference was recorded beside the torque");
@@ -331,9 +408,10 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     // The noise of the validation data under the extended model; one set of weights for all three models.
     if (!estimate_validation_noise(w, h, &d->extended_model))
         return false;
-    d->nominal = validate_figures(&w->validate_data, &d->given);
-    d->refitted = validate_figures(&w->validate_data, &d->refitted_model);
-    d->extended = validate_figures(&w->validate_data, &d->extended_model);
+    bool in_time = contrast_concerns(&d->extended_model);
+    d->nominal = validate_figures(&w->validate_data, &d->given, in_time);
+    d->refitted = validate_figures(&w->validate_data, &d->refitted_model, in_time);
+    d->extended = validate_figures(&w->validate_data, &d->extended_model, in_time);
     d->noise_floor_nrmse = validate_noise_floor(&w->validate_data, &d->extended_model);
     struct judgement judgement;
     // An effect that cannot show in the validation data changes nothing there; one that spoils it is a wrong name.
@@ -342,9 +420,9 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
                  d->extended.validation_nrmse > clearly * d->noise_floor_nrmse;
     if (!judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, d->extended.whitened_rms, worse, &judgement))
         return false;
-    d->verdict = judgement.unexplained ? diagnosis_unexplained
-                 : judgement.count > 0 ? diagnosis_explained
-                                       : diagnosis_no_discrepancy;
+    d->verdict = judgement.unexplained                                         ? diagnosis_unexplained
+                 : judgement.count > 0 || w->recordings[0].finding.effect >= 0 ? diagnosis_explained
+                                                                               : diagnosis_no_discrepancy;
     list_causes(w, d, h, &judgement);
     list_untestable(w, d, h);
     list_deviations(w, d, h);
@@ -371,6 +449,8 @@ int diagnosis_run(const struct diagnosis_request *request, struct diagnosis *out
     int status = prepare_recordings(request, &w, d, out_error);
     if (status == 0)
         status = choose_model(request, &w.recordings[0], d, out_error);
+    if (status == 0)
+        status = look_at_oddities(request, &w, d, out_error);
     if (status == 0)
         status = prepare_evidence(&w, d, out_error);
     if (status == 0) {

@@ -6,6 +6,7 @@
 #ifndef SERVOSCOPE_DIAGNOSE_DIAGNOSIS_H
 #define SERVOSCOPE_DIAGNOSE_DIAGNOSIS_H
 
+#include "lab/diagnose/oddities.h"
 #include "lab/record/error.h"
 #include "lab/record/model_file.h"
 #include "lab/record/run.h"
@@ -64,6 +65,7 @@ struct diagnosis {
     enum diagnosis_verdict verdict;
     bool linear, model_given, held_back; ///< held_back: validated on the last part of the only run
     char runs[512], motion_from[280];    ///< what was fitted; one sentence on the filtering
+    struct oddities oddities;            ///< about the recordings, before any model
     struct sim_model given, refitted_model, extended_model;
     struct model_deviations deviations; ///< of extended_model
     size_t cause_count, candidate_count, tie_count, untestable_count;

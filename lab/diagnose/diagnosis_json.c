@@ -98,6 +98,17 @@ static bool add_unexplained(cJSON *root, const struct diagnosis *self)
     return object && add_text(object, "where", self->where) && add_number(object, "share", self->unexplained_share);
 }
 
+static bool add_notes(cJSON *root, const struct diagnosis *self)
+{
+    cJSON *array = cJSON_AddArrayToObject(root, "notes");
+    bool ok = array != NULL;
+    for (size_t i = 0; ok && i < self->oddities.count; i++) {
+        cJSON *text = cJSON_CreateString(self->oddities.texts[i]);
+        ok = text && cJSON_AddItemToArray(array, text);
+    }
+    return ok;
+}
+
 /// What a reader of the file alone would miss: the verdict as a sentence, and what it rests on.
 static bool add_context(cJSON *root, const struct diagnosis *self)
 {
@@ -105,7 +116,8 @@ static bool add_context(cJSON *root, const struct diagnosis *self)
     wording_headline(self, headline);
     wording_gain(self, gain);
     return add_text(root, "headline", headline) && add_text(root, "gain", gain) && add_text(root, "runs", self->runs) &&
-           add_text(root, "motion_from", self->motion_from) && cJSON_AddBoolToObject(root, "linear", self->linear) &&
+           add_text(root, "motion_from", self->motion_from) && add_notes(root, self) &&
+           cJSON_AddBoolToObject(root, "linear", self->linear) &&
            cJSON_AddBoolToObject(root, "model_given", self->model_given) &&
            cJSON_AddBoolToObject(root, "held_back", self->held_back) &&
            add_number(root, "fit_misfit", self->fit_misfit);

@@ -10,9 +10,9 @@
 bool fit_init(struct fit *self, const struct fit_data *data)
 {
     memset(self, 0, sizeof *self);
-    size_t most = hypothesis_coordinates_max;
-    self->residual = malloc(data->values * sizeof(double));
-    self->jacobian = malloc(data->values * most * sizeof(double));
+    size_t most = hypothesis_coordinates_max, rows = data->values + data->contrasts;
+    self->residual = malloc(rows * sizeof(double));
+    self->jacobian = malloc(rows * most * sizeof(double));
     self->covariance = malloc(most * most * sizeof(double));
     if (self->residual && self->jacobian && self->covariance)
         return true;
@@ -28,12 +28,16 @@ void fit_free(struct fit *self)
     memset(self, 0, sizeof *self);
 }
 
-void fit_residual(const struct fit_data *data, const struct sim_model *model, double *out_residual)
+size_t fit_residual(const struct fit_data *data, const struct sim_model *model, double *out_residual)
 {
+    bool in_time = data->contrasts > 0 && contrast_concerns(model);
+    double *contrasts = out_residual + data->values;
     for (size_t i = 0; i < data->runs; i++) {
-        evidence_residual(&data->evidence[i], model, out_residual);
+        evidence_residual(&data->evidence[i], model, out_residual, in_time ? contrasts : NULL);
         out_residual += data->evidence[i].values;
+        contrasts += data->evidence[i].contrast.values;
     }
+    return data->values + (in_time ? data->contrasts : 0);
 }
 
 static double prior_cost(const struct hypothesis *h, const double *x)
@@ -54,26 +58,42 @@ static double sum_of_squares(size_t n, const double *r)
     return sum;
 }
 
+/// Of a residual of `rows`. A hypothesis without an effect in time leaves the contrasts as they are.
+static double contrast_cost(const struct fit_data *data, size_t rows, const double *residual)
+{
+    double sum = rows > data->values ? sum_of_squares(rows - data->values, residual + data->values) : 0.0;
+    for (size_t i = 0; data->contrasts > 0 && i < data->runs; i++) {
+        const struct contrast *c = &data->evidence[i].contrast;
+        sum += (rows > data->values ? 0.0 : c->without) - c->reference;
+    }
+    return sum;
+}
+
+double fit_contrast_cost(const struct fit *self, const struct fit_data *data)
+{
+    return contrast_cost(data, self->rows, self->residual);
+}
+
 static double residual_at(const struct fit_data *data, const struct hypothesis *h, const double *x,
-                          double *out_residual)
+                          double *out_residual, size_t *out_rows)
 {
     struct sim_model model;
     hypothesis_model(h, x, &model);
-    fit_residual(data, &model, out_residual);
-    double sum = sum_of_squares(data->values, out_residual);
+    *out_rows = fit_residual(data, &model, out_residual);
+    double sum = sum_of_squares(data->values, out_residual) + contrast_cost(data, *out_rows, out_residual);
     return isfinite(sum) ? sum + prior_cost(h, x) : INFINITY;
 }
 
 double fit_cost(struct fit *self, const struct fit_data *data, const struct hypothesis *hypothesis, const double *x)
 {
-    self->cost = residual_at(data, hypothesis, x, self->residual);
+    self->cost = residual_at(data, hypothesis, x, self->residual, &self->rows);
     self->prior = prior_cost(hypothesis, x);
     return self->cost;
 }
 
 /// One-sided differences, away from the nearer bound. The residual is nearly linear in most coordinates, so that a step
 /// large enough to average over the instants at which friction changes sign costs no accuracy.
-static void differentiate_by(const struct fit_data *data, const struct hypothesis *h, size_t i, const double *residual,
+static void differentiate_by(const struct fit *self, const struct fit_data *data, const struct hypothesis *h, size_t i,
                              double *out_column)
 {
     double x[hypothesis_coordinates_max];
@@ -83,23 +103,37 @@ static void differentiate_by(const struct fit_data *data, const struct hypothesi
     if (h->x[i] + step > c->upper)
         step = -step;
     x[i] += step;
-    residual_at(data, h, x, out_column);
-    for (size_t j = 0; j < data->values; j++)
-        out_column[j] = (out_column[j] - residual[j]) / step;
+    size_t rows;
+    residual_at(data, h, x, out_column, &rows);
+    for (size_t j = 0; j < self->rows; j++)
+        out_column[j] = (out_column[j] - self->residual[j]) / step;
 }
 
-static void differentiate(struct fit *self, const struct fit_data *data, const struct hypothesis *h,
-                          const double *residual)
+static void differentiate(struct fit *self, const struct fit_data *data, const struct hypothesis *h)
 {
     for (size_t i = 0; i < h->count; i++)
-        differentiate_by(data, h, i, residual, self->jacobian + i * data->values);
+        differentiate_by(self, data, h, i, self->jacobian + i * self->rows);
+}
+
+void fit_linear(const struct fit *self, const struct fit_data *data, const struct hypothesis *hypothesis, double *out_A,
+                double *out_weight, double *out_centre)
+{
+    size_t rows = data->values;
+    for (size_t i = 0; i < hypothesis->count; i++) {
+        const struct coordinate *c = &hypothesis->coordinates[i];
+        const double *column = self->jacobian + i * self->rows;
+        double prior = c->weight * c->weight, seen = sum_of_squares(self->rows - rows, column + rows);
+        memcpy(out_A + i * rows, column, rows * sizeof *column);
+        out_weight[i] = sqrt(prior + seen);
+        out_centre[i] = prior + seen > 0.0 ? prior * (c->centre - hypothesis->x[i]) / (prior + seen) : 0.0;
+    }
 }
 
 /// Solves for the step; coordinates that would leave their box are put on its wall and the others solved again.
-static bool solve_step(const struct fit *self, const struct fit_data *data, const struct hypothesis *h, double damping,
-                       double *work, double *out_x, double *out_covariance)
+static bool solve_step(const struct fit *self, const struct hypothesis *h, double damping, double *work, double *out_x,
+                       double *out_covariance)
 {
-    size_t n = h->count, rows = data->values;
+    size_t n = h->count, rows = self->rows;
     bool held[hypothesis_coordinates_max] = {false};
     double weight[hypothesis_coordinates_max], centre[hypothesis_coordinates_max], step[hypothesis_coordinates_max];
     double *columns = work, *rhs = work + rows * n;
@@ -157,14 +191,15 @@ static bool take_step(struct fit *self, const struct fit_data *data, struct hypo
                       double *trial, double *io_damping, bool *out_taken)
 {
     const double settled = 1e-3; // of -2 log likelihood
-    double cost = residual_at(data, h, x, trial), before = self->cost;
+    size_t rows;
+    double cost = residual_at(data, h, x, trial, &rows), before = self->cost;
     *out_taken = cost < before;
     if (!*out_taken) {
         *io_damping = *io_damping > 0.0 ? *io_damping * 8.0 : 1e-2;
         return *io_damping < 1e4;
     }
     memcpy(h->x, x, h->count * sizeof *x);
-    memcpy(self->residual, trial, data->values * sizeof *trial);
+    memcpy(self->residual, trial, rows * sizeof *trial);
     self->cost = cost;
     *io_damping = *io_damping > 1e-3 ? *io_damping * 0.1 : 0.0;
     return before - cost > settled;
@@ -173,27 +208,27 @@ static bool take_step(struct fit *self, const struct fit_data *data, struct hypo
 /// Up to `iterations` steps; `finish`: derivatives and covariance at the x where it ends.
 static bool improve(struct fit *self, const struct fit_data *data, struct hypothesis *h, size_t iterations, bool finish)
 {
-    size_t rows = data->values;
+    size_t rows = data->values + data->contrasts;
     double *work = malloc((rows * h->count + 2 * rows) * sizeof *work);
     if (!work)
         return false;
     double *trial = work + rows * h->count + rows;
     double damping = 0.0, x[hypothesis_coordinates_max];
     bool good = true, fresh = false, more = true;
-    self->cost = residual_at(data, h, h->x, self->residual);
+    self->cost = residual_at(data, h, h->x, self->residual, &self->rows);
     for (size_t i = 0; i < iterations && good && more; i++) {
         if (!fresh)
-            differentiate(self, data, h, self->residual);
+            differentiate(self, data, h);
         fresh = true;
-        good = solve_step(self, data, h, damping, work, x, self->covariance);
+        good = solve_step(self, h, damping, work, x, self->covariance);
         bool taken = false;
         more = good && moved(h, x) && take_step(self, data, h, x, trial, &damping, &taken);
         fresh = !taken;
     }
     if (good && finish) {
         if (!fresh)
-            differentiate(self, data, h, self->residual);
-        good = solve_step(self, data, h, 0.0, work, x, self->covariance);
+            differentiate(self, data, h);
+        good = solve_step(self, h, 0.0, work, x, self->covariance);
     }
     self->prior = prior_cost(h, h->x);
     free(work);
@@ -222,26 +257,36 @@ static size_t find_coordinate(const struct hypothesis *h, const struct coordinat
     return h->count;
 }
 
+/// A column of another fit's Jacobian; if that had no effect in time, the contrasts do not depend on its coordinates
+/// but through the effect in time itself, which is small as long as it is new.
+static void take_column(const struct fit *from, size_t i, size_t rows, double *out_column)
+{
+    size_t shared = from->rows < rows ? from->rows : rows;
+    memcpy(out_column, from->jacobian + i * from->rows, shared * sizeof *out_column);
+    memset(out_column + shared, 0, (rows - shared) * sizeof *out_column);
+}
+
 bool fit_step(struct fit *self, const struct fit_data *data, const struct hypothesis *base, const struct fit *base_fit,
               struct hypothesis *io_trial)
 {
     struct hypothesis *h = io_trial;
-    size_t rows = data->values;
-    double *work = malloc((rows * h->count + 2 * rows) * sizeof *work);
+    size_t most = data->values + data->contrasts;
+    double *work = malloc((most * h->count + 2 * most) * sizeof *work);
     if (!work)
         return false;
-    self->cost = residual_at(data, h, h->x, self->residual);
+    self->cost = residual_at(data, h, h->x, self->residual, &self->rows);
     for (size_t i = 0; i < h->count; i++) {
         size_t j = find_coordinate(base, &h->coordinates[i]);
-        double *column = self->jacobian + i * rows;
+        double *column = self->jacobian + i * self->rows;
         if (j < base->count)
-            memcpy(column, base_fit->jacobian + j * rows, rows * sizeof *column);
+            take_column(base_fit, j, self->rows, column);
         else
-            differentiate_by(data, h, i, self->residual, column);
+            differentiate_by(self, data, h, i, column);
     }
-    double x[hypothesis_coordinates_max], *trial = work + rows * h->count + rows;
-    bool good = solve_step(self, data, h, 0.0, work, x, self->covariance);
-    double cost = good ? residual_at(data, h, x, trial) : INFINITY;
+    double x[hypothesis_coordinates_max], *trial = work + most * h->count + most;
+    bool good = solve_step(self, h, 0.0, work, x, self->covariance);
+    size_t rows;
+    double cost = good ? residual_at(data, h, x, trial, &rows) : INFINITY;
     if (cost < self->cost) {
         self->cost = cost;
         memcpy(h->x, x, h->count * sizeof *x);

@@ -11,21 +11,24 @@ struct fit_data {
     size_t runs;
     const struct evidence *evidence; ///< runs of them
     size_t values;                   ///< whitened residuals of all together
+    size_t contrasts; ///< what differs between periods, for hypotheses with an effect in time; contrast.h
 };
 
 struct fit {
     double cost;        ///< sum of squares of whitened residuals and priors: -2 log likelihood but for a constant
     double prior;       ///< the priors' part of it
-    double *residual;   ///< data->values, at the hypothesis' x
-    double *jacobian;   ///< values x count, column after column, at the same x
+    size_t rows;        ///< data->values, and data->contrasts after them if the hypothesis has an effect in time
+    double *residual;   ///< rows, at the hypothesis' x
+    double *jacobian;   ///< rows x count, column after column, at the same x
     double *covariance; ///< count x count, of the coordinates; coordinates at a bound have zero
 };
 
 bool fit_init(struct fit *self, const struct fit_data *data);
 void fit_free(struct fit *self);
 
-/// Whitened residuals of all runs under a model.
-void fit_residual(const struct fit_data *data, const struct sim_model *model, double *out_residual);
+/// Whitened residuals of all runs under a model: data->values, and where the model has an effect in time the contrasts
+/// of all runs after them. Returns how many were written.
+size_t fit_residual(const struct fit_data *data, const struct sim_model *model, double *out_residual);
 
 /// Improves hypothesis->x from where it is; at most `iterations` steps. On return residual, jacobian, covariance and
 /// cost belong to the returned x. Errors: false if memory is short or the linear system cannot be solved; x is then the
@@ -41,6 +44,16 @@ bool fit_roughly(struct fit *self, const struct fit_data *data, struct hypothesi
 /// Errors: as fit_run.
 bool fit_step(struct fit *self, const struct fit_data *data, const struct hypothesis *base, const struct fit *base_fit,
               struct hypothesis *io_trial);
+
+/// Linear least squares about a fit, on the blocks alone: columns of the Jacobian, and for each coordinate a weight and
+/// a centre that stand for its prior and for what the contrasts say of it.
+/// Shapes: out_A: data->values x count; out_weight, out_centre: count
+void fit_linear(const struct fit *self, const struct fit_data *data, const struct hypothesis *hypothesis, double *out_A,
+                double *out_weight, double *out_centre);
+
+/// The part of the cost that neither blocks nor priors have: the contrasts', less what they had under the model that
+/// the noise was estimated with.
+double fit_contrast_cost(const struct fit *self, const struct fit_data *data);
 
 /// Cost of the hypothesis at x without derivatives.
 double fit_cost(struct fit *self, const struct fit_data *data, const struct hypothesis *hypothesis, const double *x);

@@ -128,22 +128,41 @@ void hypothesis_init(struct hypothesis *self, const struct sim_model *given, boo
     add_nuisances(self);
 }
 
+/// Whether the model as it is now, other names included, has what the effect acts on.
+static bool has_place_for(const struct hypothesis *self, int effect)
+{
+    struct sim_model model;
+    if (!sim_effects[effect]->applies)
+        return true;
+    hypothesis_model(self, NULL, &model);
+    return sim_effects[effect]->applies(&model);
+}
+
 bool hypothesis_may_name(const struct hypothesis *self, int effect)
 {
     const struct sim_effect *e = sim_effects[effect];
-    if (self->named[effect] || self->given->effect_on[effect] ||
+    // What is noticed in the rows themselves needs no fit.
+    if (self->named[effect] || self->given->effect_on[effect] || e->notice ||
         self->count + e->parameter_count + 2 > hypothesis_coordinates_max)
         return false;
     if (e->place == sim_place_actuator && !self->actuator_seen)
         return false;
     bool free_inertia =
         e->parameters[0].model_offset == offsetof(struct sim_model, load_inertia_kgm2) && self->inertia_free;
-    return !free_inertia && (!e->applies || e->applies(self->given));
+    return !free_inertia && has_place_for(self, effect);
+}
+
+/// Whether only the comparison of position and speed columns shows a parameter, and there is none: it is as usual.
+static bool is_usual(const struct hypothesis *self, int effect, size_t i)
+{
+    return sim_effects[effect]->sense && sim_effects[effect]->parameters[i].optional && !self->sensors_seen;
 }
 
 static void name_parameter(struct hypothesis *self, int effect, size_t i, const double *values)
 {
     const struct sim_parameter *p = &sim_effects[effect]->parameters[i];
+    if (is_usual(self, effect, i))
+        return;
     bool linear = self->given->linear;
     double low = linear ? p->linear_minimum : p->minimum, high = linear ? p->linear_maximum : p->maximum;
     struct coordinate c = {.effect = effect, .parameter = i, .model_offset = p->model_offset, .unit = 1.0};
@@ -197,6 +216,9 @@ static void rebuild_engaged(struct hypothesis *self)
         if (sim_effects[e]->engage)
             sim_effects[e]->engage(&self->engaged);
         self->engaged.effect_on[e] = sim_effects[e]->parameters[0].model_offset == SIZE_MAX;
+        for (size_t i = 0; i < sim_effects[e]->parameter_count; i++)
+            if (is_usual(self, (int)e, i))
+                self->engaged.effect_parameters[e][i] = sim_effects[e]->parameters[i].usual;
     }
 }
 
@@ -215,7 +237,7 @@ void hypothesis_name(struct hypothesis *self, int effect, const double *values)
     add_nuisances(self);
 }
 
-void hypothesis_unname(struct hypothesis *self, int effect)
+static void take_back(struct hypothesis *self, int effect)
 {
     self->named[effect] = false;
     for (size_t i = self->count; i-- > 0;)
@@ -227,6 +249,19 @@ void hypothesis_unname(struct hypothesis *self, int effect)
             if (self->coordinates[i].effect < 0)
                 remove_coordinate(self, i);
     add_nuisances(self);
+}
+
+void hypothesis_unname(struct hypothesis *self, int effect)
+{
+    take_back(self, effect);
+    for (int e = 0; sim_effects[e]; e++) {
+        struct hypothesis without = *self;
+        if (!self->named[e] || !sim_effects[e]->applies)
+            continue;
+        take_back(&without, e);
+        if (!has_place_for(&without, e))
+            *self = without;
+    }
 }
 
 static double *parameter_place(const struct coordinate *c, struct sim_model *model)
@@ -261,6 +296,9 @@ void hypothesis_parameters(const struct hypothesis *self, int effect, const doub
     struct sim_model model;
     hypothesis_model(self, NULL, &model);
     size_t n = self->count;
+    for (size_t i = 0; i < sim_effects[effect]->parameter_count; i++)
+        if (is_usual(self, effect, i))
+            out_values[i] = model.effect_parameters[effect][i];
     for (size_t i = 0; i < n; i++) {
         const struct coordinate *c = &self->coordinates[i];
         if (c->effect != effect)

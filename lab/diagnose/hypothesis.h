@@ -35,6 +35,7 @@ struct hypothesis {
     const struct sim_model *given;
     bool inertia_free;  ///< no model was given: the rigid body's inertia has no prior and no box
     bool actuator_seen; ///< the recordings have a torque reference: what lies between it and the torque can show
+    bool sensors_seen;  ///< position and speed were recorded by columns of their own: what one says of the other counts
     bool named[sim_effects_max];
     size_t count;
     struct coordinate coordinates[hypothesis_coordinates_max];
@@ -51,7 +52,8 @@ bool hypothesis_may_name(const struct hypothesis *self, int effect);
 /// Names an effect, its parameters starting at `values`.
 void hypothesis_name(struct hypothesis *self, int effect, const double *values);
 
-/// Takes a name back; the parameters of the others keep their values.
+/// Takes a name back, and with it the names of effects that have nothing to act on without it; the parameters of the
+/// others keep their values.
 void hypothesis_unname(struct hypothesis *self, int effect);
 
 /// The model at coordinates x (NULL: the hypothesis' own).

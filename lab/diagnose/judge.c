@@ -4,6 +4,7 @@
 #include "lab/diagnose/blackbox.h"
 #include "lab/diagnose/predict.h"
 #include "lab/diagnose/search.h"
+#include "lab/diagnose/structure.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -23,12 +24,15 @@ static double effect_share(const struct fit_data *data, const struct sim_coverag
     hypothesis_model(&without, NULL, &without_model);
     const struct evidence *e = &data->evidence[0];
     const struct recording *r = e->recording;
-    size_t n = r->block.samples;
+    // What depends on time averages out over a mean of periods.
+    bool whole = sim_effects[effect]->in_time;
+    const struct stretch *stretch = whole ? &r->all : &r->block;
+    size_t n = stretch->samples;
     double *work = malloc(4 * n * sizeof *work);
     if (!work)
         return 0.0;
-    predict(&with_model, &r->block, r->periodic, e->scale_inertia, work, work + n);
-    predict(&without_model, &r->block, r->periodic, e->scale_inertia, work + 2 * n, work + 3 * n);
+    predict(&with_model, stretch, r->periodic && !whole, e->scale_inertia, work, work + n);
+    predict(&without_model, stretch, r->periodic && !whole, e->scale_inertia, work + 2 * n, work + 3 * n);
     double sum = 0.0;
     for (size_t i = 0; i < 2 * n; i++) {
         double d = work[i] - work[2 * n + i];
@@ -36,6 +40,39 @@ static double effect_share(const struct fit_data *data, const struct sim_coverag
     }
     free(work);
     return sqrt(sum / (double)n) / coverage->torque_rms;
+}
+
+/// The block's noise within the band as a share of the torque's RMS.
+static double noise_share(const struct fit_data *data, const struct sim_coverage *coverage)
+{
+    const struct evidence *e = &data->evidence[0];
+    double power = e->covariance[0];
+    for (size_t k = 1; k <= e->recording->band; k++)
+        power += 2.0 * e->covariance[4 * k];
+    return sqrt(power) / coverage->torque_rms;
+}
+
+/// Share of the speed's RMS by which the sensors' columns differ for an effect.
+static double sensor_share(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *h,
+                           int effect)
+{
+    const struct recording *r = data->evidence[0].recording;
+    size_t n = r->block.samples;
+    if (!sim_effects[effect]->sense || data->evidence[0].kinematics.values == 0)
+        return 0.0;
+    double *left = malloc(n * sizeof *left);
+    struct sim_model model;
+    hypothesis_model(h, NULL, &model);
+    for (int e = 0; sim_effects[e]; e++)
+        model.effect_on[e] = model.effect_on[e] && e == effect;
+    double sum = 0.0;
+    if (left) {
+        predict_kinematics(&model, &r->block, left);
+        for (size_t i = 0; i < n; i++)
+            sum += (left[i] - r->block.kinematics[i]) * (left[i] - r->block.kinematics[i]);
+    }
+    free(left);
+    return sqrt(sum / (double)n) / coverage->velocity_rms;
 }
 
 /// Evidence for an effect when the black box may explain everything it can.
@@ -53,6 +90,30 @@ static double evidence_beside(const struct blackbox *box, const struct fit_data 
         blackbox_gain(box, data, &without, &trial, blackbox_all, &without_cost, NULL);
     fit_free(&trial);
     return 0.5 * (without_cost - with_cost);
+}
+
+/// Evidence for an effect from the bins that structure over time leaves alone: how noisy the mean of the periods is in
+/// the others, their scatter does not say.
+static double evidence_outside(const struct fit_data *data, const struct hypothesis *h, const struct fit *fit,
+                               int effect, const struct structure *structure)
+{
+    struct fit trial;
+    struct hypothesis without = *h;
+    double gain = 0.0;
+    if (!fit_init(&trial, data))
+        return 0.0;
+    hypothesis_unname(&without, effect);
+    if (fit_run(&trial, data, &without, trial_iterations)) {
+        size_t at = 0;
+        for (size_t run = 0; run < data->runs; run++)
+            for (size_t i = 0; i < data->evidence[run].values; i++, at++) {
+                size_t channel, bin = evidence_bin(&data->evidence[run], i, &channel);
+                if (bin < structure->first_bin || bin > structure->last_bin)
+                    gain += 0.5 * (trial.residual[at] * trial.residual[at] - fit->residual[at] * fit->residual[at]);
+            }
+    }
+    fit_free(&trial);
+    return gain;
 }
 
 /// Says where the residual is: the band of frequencies that holds most of it, and what kind of term would explain it.
@@ -87,22 +148,57 @@ static void describe_rest(const struct blackbox *box, const struct fit_data *dat
              blackbox_group_name((enum blackbox_group)best), 100.0 * fmin(2.0 * gains[best] / fmax(total, 1e-9), 1.0));
 }
 
-static void judge_names(const struct blackbox *box, const struct fit_data *data, const struct sim_coverage *coverage,
-                        const struct hypothesis *h, const struct fit *fit, struct judgement *j)
+/// Structure over time in what the hypothesis leaves of the contrasts; the strongest over all runs. `left`: what a black
+/// box leaves of the residual.
+static bool look_over_time(const struct fit_data *data, const struct fit *fit, const double *left,
+                           struct structure *out)
 {
-    const double least_share = 0.0015; // of the torque's RMS: less is not worth a name even if it is significant
+    const double *contrasts = fit->rows > data->values ? fit->residual + data->values : NULL;
+    memset(out, 0, sizeof *out);
+    for (size_t i = 0; i < data->runs; i++) {
+        const struct evidence *e = &data->evidence[i];
+        struct structure s;
+        if (!structure_find(e, contrasts ? contrasts : e->contrast.base, &s))
+            return false;
+        if (!e->recording->periodic)
+            structure_find_slow(e, left, &s);
+        left += e->values;
+        if (s.found && (!out->found || s.nats > out->nats))
+            *out = s;
+        if (contrasts)
+            contrasts += e->contrast.values;
+    }
+    return true;
+}
+
+static void judge_names(const struct blackbox *box, const struct fit_data *data, const struct sim_coverage *coverage,
+                        const struct hypothesis *h, const struct fit *fit, const struct structure *over_time,
+                        struct judgement *j)
+{
+    // Of the torque's RMS: less is not worth a name even if it is significant; unless the noise is smaller still.
+    const double least_share = fmin(0.0015, fmax(0.0003, 0.5 * noise_share(data, coverage)));
+    const double least_sensor_share = 2e-5; // of the speed's: a position is known that well
     // How far a cause has to outweigh what stays unexplained. Beside a given model a name says what changed, and a term
     // of the wrong shape gains a hundred times what it leaves. Without a model it says what is there at all.
     const double dominance = h->inertia_free ? 5.0 : 1000.0;
+    // Effects in time answer for what stays over time, the others for what stays of the mean of the periods.
+    const double dominance_in_time = 20.0;
     for (int e = 0; sim_effects[e]; e++) {
         if (!h->named[e])
             continue;
-        bool stands = effect_share(data, coverage, h, e) >= least_share;
-        if (stands && j->unexplained) {
+        bool in_time = sim_effects[e]->in_time && data->contrasts > 0;
+        bool stands = effect_share(data, coverage, h, e) >= least_share ||
+                      sensor_share(data, coverage, h, e) >= least_sensor_share;
+        if (stands && in_time)
+            stands = !(j->leftover_in_time > 0.0) ||
+                     search_evidence(data, h, fit, e) > dominance_in_time * j->leftover_in_time;
+        else if (stands && j->of_mean) {
             double evidence = search_evidence(data, h, fit, e);
             stands = evidence > dominance * j->leftover ||
                      evidence_beside(box, data, h, fit, e) > fmax(0.05 * evidence, 0.1 * j->leftover);
         }
+        if (stands && over_time->found && !in_time)
+            stands = evidence_outside(data, h, fit, e, over_time) > search_threshold(data, e);
         j->stands[e] = stands;
         j->count += stands;
     }
@@ -122,6 +218,7 @@ static enum blackbox_group one_gap(const struct blackbox *box, const struct fit_
     if (names < patchwork || !fit_init(&trial, data))
         return blackbox_groups;
     hypothesis_init(&bare, h->given, h->inertia_free, h->actuator_seen);
+    bare.sensors_seen = h->sensors_seen;
     enum blackbox_group found = blackbox_groups;
     if (fit_run(&trial, data, &bare, trial_iterations))
         for (int g = 0; g < blackbox_groups && found == blackbox_groups; g++) {
@@ -143,8 +240,10 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
     memset(j, 0, sizeof *j);
     if (!blackbox_init(&box, data))
         return false;
-    double left;
-    j->leftover = blackbox_gain(&box, data, hypothesis, fit, blackbox_all, &left, NULL);
+    double left, *rest = malloc(data->values * sizeof *rest);
+    if (rest)
+        memcpy(rest, fit->residual, data->values * sizeof *rest);
+    j->leftover = blackbox_gain(&box, data, hypothesis, fit, blackbox_all, &left, rest);
     double scale = fmax(left / (double)data->values, 1.0);
     double chance = 0.5 * (double)box.columns + 12.0 * sqrt(0.5 * (double)box.columns);
     const double half_again = 1.5, visible = 1.12; // a third of the noise, in amplitude
@@ -152,18 +251,30 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
     j->unexplained = worse ||
                      (j->leftover / scale > chance && fit->cost > visible * left && !(validation_rms < seen_again)) ||
                      fit->cost / (double)data->values > half_again * half_again || !(validation_rms < half_again);
+    j->of_mean = j->unexplained;
     enum blackbox_group gap = hypothesis->inertia_free ? blackbox_groups : one_gap(&box, data, hypothesis, fit);
     if (gap != blackbox_groups && !j->unexplained) {
-        j->unexplained = true;
+        j->unexplained = j->of_mean = true;
         j->leftover = fit->cost;
         snprintf(j->where, sizeof j->where, "several names were needed for one gap, which %s alone would close",
                  blackbox_group_name(gap));
     } else if (j->unexplained)
         describe_rest(&box, data, hypothesis, fit, j->where, sizeof j->where);
+    struct structure over_time;
+    bool good = rest && look_over_time(data, fit, rest, &over_time);
+    if (!good)
+        memset(&over_time, 0, sizeof over_time);
+    free(rest);
+    if (over_time.found) {
+        j->leftover_in_time = over_time.nats;
+        if (!j->unexplained || over_time.nats > j->leftover)
+            snprintf(j->where, sizeof j->where, "%s", over_time.where);
+        j->unexplained = true;
+    }
     if (!worse)
-        judge_names(&box, data, coverage, hypothesis, fit, j);
+        judge_names(&box, data, coverage, hypothesis, fit, &over_time, j);
     blackbox_free(&box);
-    return true;
+    return good;
 }
 
 /// Whether another effect does as well as the one that was taken out of a hypothesis (`without`, fitted).

@@ -8,9 +8,10 @@
 #include "lab/diagnose/fit.h"
 
 struct judgement {
-    bool unexplained;
-    double leftover; ///< nats that the black box still gains over the named causes
-    size_t count;    ///< of named effects that stand
+    bool unexplained, of_mean; ///< of_mean: of the mean of the periods, not only over time
+    double leftover;           ///< nats that the black box still gains over the named causes
+    double leftover_in_time;   ///< nats of structure over time that stays; 0: none
+    size_t count;              ///< of named effects that stand
     bool stands[sim_effects_max];
     char where[300]; ///< what is left, in words
 };
@@ -18,10 +19,10 @@ struct judgement {
 /// Judges a finished search. `validation_rms` is the whitened RMS of the extended model on the validation data; `worse`
 /// says that the extended model errs more there than the refitted one.
 /// Unexplained: the black box gains more than chance allows (its expected gain plus twelve standard deviations) and
-///              more than a
-/// third of the noise in amplitude, or one group of it does as well as three names, or the residual on fit or
-/// validation data is half again as large as the noise. A name stands if it explains a visible share of the torque and,
-/// where something stays unexplained, far more than what stays and more than the black box can do without it.
+/// more than a third of the noise in amplitude, or one group of it does as well as three names, or the residual on fit
+/// or validation data is half again as large as the noise, or periods differ beyond chance.
+/// A name stands if it explains a visible share of the torque and, where something stays unexplained, far more than
+/// what stays and more than the black box can do without it.
 /// Errors: false if memory is short.
 bool judge(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,
            const struct fit *fit, double validation_rms, bool worse, struct judgement *out_judgement);

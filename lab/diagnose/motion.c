@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/diagnose/motion.h"
 
+#include "lab/diagnose/oddities.h"
 #include "lab/diagnose/recording.h"
 #include "lab/numeric/filter.h"
 
@@ -52,10 +53,42 @@ static double white_noise(size_t n, const double *x, size_t period)
 struct agreement {
     double gain;  ///< of the speed column over the derivative of the position
     double delay; ///< of the speed column, samples
+    double nearest_gain; ///< of the gains at different places of the travel, the one nearest to one
 };
 
+enum { places = 8 };
+
+/// Gain of the speed column where it is nearest to one: a sensor that is wrong by position is wrong both ways over the
+/// travel, a column in a wrong unit is wrong everywhere.
+static double nearest_gain(size_t n, const double *position, const double *derivative, const double *velocity)
+{
+    double low = INFINITY, high = -INFINITY, dd[places] = {0}, dv[places] = {0}, all = 0.0, best = INFINITY;
+    for (size_t i = 0; i < n; i++) {
+        low = fmin(low, position[i]);
+        high = fmax(high, position[i]);
+    }
+    for (size_t i = 6; i + 6 < n && high > low; i++) {
+        size_t at = (size_t)fmin((position[i] - low) / (high - low) * places, places - 1);
+        dd[at] += derivative[i] * derivative[i];
+        dv[at] += derivative[i] * velocity[i];
+        all += derivative[i] * derivative[i];
+    }
+    const double enough = 0.02; // of the travel's power: a place that was hardly passed says nothing
+    bool above = false, below = false;
+    for (size_t i = 0; i < places; i++) {
+        if (!(dd[i] > enough * all))
+            continue;
+        double off = dv[i] / dd[i] - 1.0;
+        above = above || off >= 0.0;
+        below = below || off <= 0.0;
+        best = fabs(off) < fabs(best) ? off : best;
+    }
+    return (above && below) || !isfinite(best) ? 1.0 : 1.0 + best;
+}
+
 /// Least squares of speed = gain * derivative - delay * d(derivative)/dn.
-static struct agreement compare_speed(size_t n, const double *derivative, const double *velocity)
+static struct agreement compare_speed(size_t n, const double *position, const double *derivative,
+                                      const double *velocity)
 {
     double dd = 0.0, dv = 0.0, ss = 0.0, se = 0.0;
     for (size_t i = 6; i + 6 < n; i++) {
@@ -65,42 +98,114 @@ static struct agreement compare_speed(size_t n, const double *derivative, const 
         ss += slope * slope;
         se += slope * (velocity[i] - derivative[i]);
     }
-    struct agreement a = {dd > 0.0 ? dv / dd : 1.0, ss > 0.0 ? -se / ss : 0.0};
+    struct agreement a = {dd > 0.0 ? dv / dd : 1.0, ss > 0.0 ? -se / ss : 0.0,
+                          nearest_gain(n, position, derivative, velocity)};
     return a;
 }
 
-/// v + L (d - v) with L first-order low-passes, twice forward and twice backward: no phase shift, and steep enough that
-/// nothing of the position's images is left in the upper part of the band.
-static void blend(size_t n, double omega, const double *derivative, const double *velocity, double *out)
+/// First-order low-passes, twice forward and twice backward: no phase shift, and steep enough that nothing of the
+/// position's images is left in the upper part of the band.
+static void low_pass(size_t n, double omega, double *io)
 {
     double keep = exp(-omega);
-    for (size_t i = 0; i < n; i++)
-        out[i] = derivative[i] - velocity[i];
     for (int pass = 0; pass < 2; pass++) {
         double state = 0.0;
         for (size_t i = 0; i < n; i++) {
-            state = keep * state + (1.0 - keep) * out[i];
-            out[i] = state;
+            state = keep * state + (1.0 - keep) * io[i];
+            io[i] = state;
         }
         state = 0.0;
         for (size_t i = n; i-- > 0;) {
-            state = keep * state + (1.0 - keep) * out[i];
-            out[i] = state;
+            state = keep * state + (1.0 - keep) * io[i];
+            io[i] = state;
         }
     }
+}
+
+/// Power of the low-passed difference of two columns that stays when a gain and a delay have been allowed for, and how
+/// much of that noise would account for: the scatter of periods or, without them, what white noises let through.
+static void measure_difference(size_t n, const double *difference, const double *derivative, size_t period,
+                               double white, double *out_power, double *out_noise)
+{
+    double c[2][3] = {{0}}; // normal equations of difference on derivative and its slope
+    for (size_t i = 1; i + 1 < n; i++) {
+        double x[2] = {derivative[i], 0.5 * (derivative[i + 1] - derivative[i - 1])};
+        for (size_t a = 0; a < 2; a++) {
+            for (size_t b = 0; b < 2; b++)
+                c[a][b] += x[a] * x[b];
+            c[a][2] += x[a] * difference[i];
+        }
+    }
+    double determinant = c[0][0] * c[1][1] - c[0][1] * c[1][0];
+    bool apart = determinant > 1e-9 * c[0][0] * c[1][1];
+    double gain = apart ? (c[0][2] * c[1][1] - c[1][2] * c[0][1]) / determinant : 0.0;
+    double delay = apart ? (c[1][2] * c[0][0] - c[0][2] * c[1][0]) / determinant : 0.0;
+    size_t length = period > 0 && n >= 3 * period ? period : n, first = length < n ? period : 0;
+    double mean_power = 0.0, scatter = 0.0, count = (double)((n - first) / length);
+    for (size_t i = 1; i + 1 < length; i++) {
+        double mean = 0.0, square = 0.0;
+        for (size_t j = first + i; j + length - i <= n; j += length) {
+            double rest = difference[j] - gain * derivative[j] -
+                          delay * 0.5 * (derivative[j + 1 < n ? j + 1 : j] - derivative[j - 1]);
+            mean += rest / count;
+            square += rest * rest / count;
+        }
+        mean_power += mean * mean / (double)length;
+        scatter += (square - mean * mean) / (double)length;
+    }
+    *out_power = mean_power;
+    *out_noise = count >= 2.0 ? scatter / (count - 1.0) : white;
+}
+
+/// v + L (d - v) where the two columns agree but for noise; else the speed column as it is: an error of one column
+/// below the crossover and of the other above it would be nobody's.
+static bool blend(size_t n, double omega, double sigma_v, size_t period, const double *derivative,
+                  const double *velocity, double *out)
+{
     for (size_t i = 0; i < n; i++)
-        out[i] += velocity[i];
+        out[i] = derivative[i] - velocity[i];
+    low_pass(n, omega, out);
+    // Four first-order low-passes let 5/32 omega of white noise through; the position's is as strong at the crossover.
+    double white = 2.0 * 5.0 / 32.0 * omega * sigma_v * sigma_v, power, noise;
+    const double beyond = 2.0;
+    measure_difference(n, out, derivative, period, white, &power, &noise);
+    bool agree = !(power > beyond * noise);
+    for (size_t i = 0; i < n; i++)
+        out[i] = agree ? out[i] + velocity[i] : velocity[i];
+    return agree;
+}
+
+/// Which column is wrong nobody can say from the two alone: the position is kept, because its noise is the smaller one.
+static void say_contradiction(const struct agreement *a, char *out_text, size_t size)
+{
+    double scale;
+    const char *unit = NULL;
+    for (int linear = 0; linear < 2 && !unit; linear++)
+        unit = oddities_unit(a->gain, linear == 1, false, &scale);
+    for (int linear = 0; linear < 2 && !unit && a->gain != 0.0; linear++)
+        if ((unit = oddities_unit(1.0 / a->gain, linear == 1, true, &scale)))
+            scale = 0.0;
+    const double nearly = 0.05;
+    char hint[120] = "";
+    if (fabs(a->gain + 1.0) < nearly)
+        snprintf(hint, sizeof hint, " Its sign is wrong (--map with *-1).");
+    else if (unit && scale != 0.0)
+        snprintf(hint, sizeof hint, " It looks like %s%s (--map with *%.6g).", unit,
+                 a->gain < 0.0 ? ", and the wrong sign" : "", scale);
+    else if (unit)
+        snprintf(hint, sizeof hint, " The position looks like %s.", unit);
+    snprintf(out_text, size,
+             "The speed column is %.3g times the derivative of the position and %.2g samples late: left out.%s",
+             a->gain, a->delay, hint);
 }
 
 static bool from_both(size_t n, double rate_hz, const double *velocity, size_t period, const double *derivative,
                       struct stretch *out, char *out_text, size_t size)
 {
-    struct agreement a = compare_speed(n, derivative, velocity);
+    struct agreement a = compare_speed(n, out->position, derivative, velocity);
     const double most_gain = 0.02, most_delay = 0.1;
-    if (fabs(a.gain - 1.0) > most_gain || fabs(a.delay) > most_delay) {
-        snprintf(out_text, size,
-                 "The speed column is %.3g times the derivative of the position and %.2g samples late: left out.",
-                 a.gain, a.delay);
+    if (fabs(a.nearest_gain - 1.0) > most_gain || fabs(a.delay) > most_delay) {
+        say_contradiction(&a, out_text, size);
         return false;
     }
     double sigma_p = white_noise(n, out->position, period), sigma_v = white_noise(n, velocity, period);
@@ -108,11 +213,14 @@ static bool from_both(size_t n, double rate_hz, const double *velocity, size_t p
     // (f / f_s)^2 of the speed. Below a fiftieth of the sampling rate that is under a part in two thousand, and fades
     // fast.
     const double most = turn * 0.02;
-    double omega = sigma_p > 0.0 ? fmin(sigma_v / (sigma_p * rate_hz), most) : most;
-    blend(n, fmax(omega, 1e-6), derivative, velocity, out->velocity);
-    snprintf(out_text, size,
-             "Speed: from the position below %.3g Hz, from the speed column above, where each is less noisy.",
-             omega * rate_hz / turn);
+    double omega = fmax(sigma_p > 0.0 ? fmin(sigma_v / (sigma_p * rate_hz), most) : most, 1e-6);
+    if (blend(n, omega, sigma_v, period, derivative, velocity, out->velocity))
+        snprintf(out_text, size,
+                 "Speed: from the position below %.3g Hz, from the speed column above, where each is less noisy.",
+                 omega * rate_hz / turn);
+    else
+        snprintf(out_text, size,
+                 "Speed: the speed column, which differs from the derivative of the position by more than noise.");
     return true;
 }
 
@@ -155,7 +263,10 @@ bool motion_estimate(size_t rows, double rate_hz, const double *position, const 
     if (good) {
         memcpy(out->position, longer.position, rows * sizeof(double));
         memcpy(out->velocity, longer.velocity, rows * sizeof(double));
+        out->kinematics = longer.kinematics;
+        longer.kinematics = NULL;
     }
+    free(longer.kinematics);
     free(longer_position);
     free(longer_velocity);
     free(longer.position);
@@ -188,11 +299,16 @@ static bool motion_of_rows(size_t rows, double rate_hz, const double *position, 
                  0.1 * rate_hz);
     }
     differentiate(rows, rate_hz, out->position, derivative);
-    if (!velocity || !from_both(rows, rate_hz, velocity, period, derivative, out, out_text, size)) {
+    bool both = velocity && from_both(rows, rate_hz, velocity, period, derivative, out, out_text, size);
+    if (both) {
+        out->kinematics = malloc(rows * sizeof *out->kinematics);
+        for (size_t i = 0; out->kinematics && i < rows; i++)
+            out->kinematics[i] = velocity[i] - derivative[i];
+    } else {
         memcpy(out->velocity, derivative, rows * sizeof *derivative);
         if (!velocity && !filtered)
             snprintf(out_text, size, "Speed: derivative of the position (central differences of order 8).");
     }
     free(derivative);
-    return true;
+    return !both || out->kinematics;
 }

@@ -22,8 +22,11 @@ bool evidence_init(struct evidence *self, const struct recording *recording, dou
     self->covariance = calloc(4 * bins, sizeof(double));
     self->factor = calloc(4 * bins, sizeof(double));
     self->work = malloc((4 * n + 2 * n + 4 * bins) * sizeof(double));
-    if (self->plan && self->covariance && self->factor && self->work)
+    if (self->plan && self->covariance && self->factor && self->work && contrast_init(&self->contrast, recording) &&
+        kinematics_init(self)) {
+        self->values += self->kinematics.values;
         return true;
+    }
     evidence_free(self);
     return false;
 }
@@ -35,6 +38,8 @@ void evidence_free(struct evidence *self)
     free(self->covariance);
     free(self->factor);
     free(self->work);
+    contrast_free(&self->contrast);
+    kinematics_free(&self->kinematics);
     memset(self, 0, sizeof *self);
 }
 
@@ -145,20 +150,26 @@ static void scatter_of_periods(const struct evidence *self, const double *both, 
     }
 }
 
-static bool noise_from_periods(const struct evidence *self, const struct sim_model *model, double *raw)
+/// What the periods of a run have in common is its block, what they do not is noise or an effect that depends on time.
+static bool noise_from_periods(struct evidence *self, const struct sim_model *model, double *raw)
 {
     const struct recording *r = self->recording;
+    size_t stride = 4 * (r->band + 1);
     double *both = residuals_of_all(self, model);
-    double *spectra = malloc((r->periods + 1) * 4 * (r->band + 1) * sizeof *spectra);
+    double *spectra = malloc((r->periods + 1) * stride * sizeof *spectra);
     bool good = both && spectra;
-    if (good)
+    if (good) {
         scatter_of_periods(self, both, spectra, raw);
+        smooth(self, raw);
+        factorise(self);
+        good = contrast_take(self, model, spectra, stride) && contrast_find_tones(self, both);
+    }
     free(both);
     free(spectra);
     return good;
 }
 
-static bool noise_from_residual(const struct evidence *self, const struct sim_model *model, double *raw)
+static bool noise_from_residual(struct evidence *self, const struct sim_model *model, double *raw)
 {
     const struct recording *r = self->recording;
     size_t n = r->block.samples, bins = r->band + 1;
@@ -171,21 +182,33 @@ static bool noise_from_residual(const struct evidence *self, const struct sim_mo
     evidence_transform(self, both + n, m + 2 * bins);
     for (size_t k = 0; k < bins; k++)
         accumulate(raw + 4 * k, m + 2 * k, self->channels == 2 ? m + 2 * bins + 2 * k : NULL, 1.0);
+    smooth(self, raw);
+    factorise(self);
+    bool good = contrast_find_tones(self, both);
     free(both);
-    return true;
+    return good;
 }
 
-bool evidence_estimate_noise(struct evidence *self, const struct sim_model *model)
+static bool estimate(struct evidence *self, const struct sim_model *model)
 {
     double *raw = calloc(4 * (self->recording->band + 1), sizeof *raw);
     bool good = raw && (self->recording->periodic ? noise_from_periods(self, model, raw)
                                                   : noise_from_residual(self, model, raw));
-    if (good) {
-        smooth(self, raw);
-        factorise(self);
-    }
     free(raw);
-    return good;
+    return good && kinematics_estimate_noise(self, model);
+}
+
+bool evidence_estimate_noise(struct evidence *self, const struct sim_model *model)
+{
+    struct sim_model aligned = *model;
+    if (self->phase_free && contrast_concerns(model)) {
+        // The phase is found in contrasts, and those under a model that knows nothing of it.
+        for (size_t e = 0; sim_effects[e]; e++)
+            aligned.effect_on[e] = aligned.effect_on[e] && !sim_effects[e]->in_time;
+        if (!estimate(self, &aligned) || !contrast_align(self, model, &aligned))
+            return false;
+    }
+    return estimate(self, &aligned);
 }
 
 bool evidence_sharpen_noise(struct evidence *self, const double *whitened)
@@ -233,20 +256,64 @@ void evidence_whiten(const struct evidence *self, const double *mechanics, const
         *w++ = f[1] * ak[0] + f[2] * mk[0] - f[3] * mk[1];
         *w++ = f[1] * ak[1] + f[2] * mk[1] + f[3] * mk[0];
     }
+    memset(w, 0, self->kinematics.values * sizeof *w);
 }
 
-void evidence_residual(const struct evidence *self, const struct sim_model *model, double *out_whitened)
+/// Not a number everywhere: whoever sums squares finds out.
+static void fail(size_t count, double *out)
+{
+    for (size_t i = 0; i < count; i++)
+        out[i] = NAN;
+}
+
+/// The same and the contrasts.
+static bool signals(const struct evidence *self, const struct sim_model *model, double *out_mechanics,
+                    double *out_actuator, double *out_contrasts)
 {
     const struct recording *r = self->recording;
-    double *mechanics = self->work + 4 * r->block.samples;
-    double *actuator = self->channels == 2 ? mechanics + r->block.samples : NULL;
-    predict(model, &r->block, r->periodic, self->scale_inertia, mechanics, actuator);
-    evidence_whiten(self, mechanics, actuator, out_whitened);
+    bool in_time = self->contrast.values > 0 && contrast_concerns(model);
+    if (!in_time) {
+        predict(model, &r->block, r->periodic, self->scale_inertia, out_mechanics, out_actuator);
+        return true;
+    }
+    struct sim_model aligned;
+    double *mean = malloc(r->block.samples * sizeof *mean);
+    bool good = mean && contrast_align(self, model, &aligned) && contrast_residual(self, &aligned, out_contrasts, mean);
+    if (good) {
+        predict(&aligned, &r->block, r->periodic, self->scale_inertia, out_mechanics, out_actuator);
+        for (size_t i = 0; i < r->block.samples; i++)
+            out_mechanics[i] += mean[i];
+    }
+    free(mean);
+    return good;
+}
+
+bool evidence_signals(const struct evidence *self, const struct sim_model *model, double *out_mechanics,
+                      double *out_actuator)
+{
+    return signals(self, model, out_mechanics, out_actuator, NULL);
+}
+
+void evidence_residual(const struct evidence *self, const struct sim_model *model, double *out_whitened,
+                       double *out_contrasts)
+{
+    size_t n = self->recording->block.samples;
+    double *mechanics = self->work + 4 * n;
+    double *actuator = self->channels == 2 ? mechanics + n : NULL;
+    bool good = signals(self, model, mechanics, actuator, out_contrasts);
+    if (good)
+        evidence_whiten(self, mechanics, actuator, out_whitened);
+    if (!good || !kinematics_residual(self, model, out_whitened + self->values - self->kinematics.values))
+        fail(self->values, out_whitened);
 }
 
 size_t evidence_bin(const struct evidence *self, size_t i, size_t *out_channel)
 {
-    size_t width = 2 * self->channels;
+    size_t width = 2 * self->channels, torques = self->values - self->kinematics.values;
+    if (i >= torques) {
+        *out_channel = 2;
+        return 1 + (i - torques) / 2;
+    }
     *out_channel = i == 0 ? 0 : (i - 1) % width / 2;
     return i == 0 ? 0 : 1 + (i - 1) / width;
 }

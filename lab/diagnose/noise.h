@@ -3,6 +3,8 @@
 #ifndef SERVOSCOPE_DIAGNOSE_NOISE_H
 #define SERVOSCOPE_DIAGNOSE_NOISE_H
 
+#include "lab/diagnose/contrast.h"
+#include "lab/diagnose/kinematics.h"
 #include "lab/diagnose/recording.h"
 #include "sim/model.h"
 
@@ -18,6 +20,12 @@ struct evidence {
     double *covariance; ///< per bin 0..band: S_mm, S_aa, Re S_am, Im S_am of the block's DFT divided by its length
     double *factor;     ///< per bin: inverse Cholesky factor, l_mm, l_aa, Re l_am, Im l_am
     double *work;
+    struct contrast contrast;
+    struct kinematics kinematics;
+    bool phase_free; ///< the phase of effects in time is this run's own: it is not the first run of a fit
+    size_t tone_count;
+    double tones_hz[sim_tones_max]; ///< of sim_coverage, found with the noise
+    double tone_nats;               ///< of the strongest, against the spectrum about it
 };
 
 /// Prepares the evidence for a recording. Errors: false if memory is short.
@@ -35,10 +43,20 @@ bool evidence_estimate_noise(struct evidence *self, const struct sim_model *mode
 bool evidence_sharpen_noise(struct evidence *self, const double *whitened);
 
 /// Residual of a model on the block, whitened: independent, unit variance if the model is right.
-/// Shapes: out_whitened: self->values; order: bin by bin, mechanics before actuator, real before imaginary.
-void evidence_residual(const struct evidence *self, const struct sim_model *model, double *out_whitened);
+/// Shapes: out_whitened: self->values; order: bin by bin, mechanics before actuator, real before imaginary; after them
+/// the kinematics.
+/// out_contrasts: self->contrast.values, residual of the contrasts, written for a model that concerns them; NULL: not
+/// wanted.
+void evidence_residual(const struct evidence *self, const struct sim_model *model, double *out_whitened,
+                       double *out_contrasts);
 
-/// Whitens residual signals of the block (actuator NULL: zeros).
+/// Residual signals of a model on the block, not whitened: mechanics and actuator (NULL: not wanted).
+/// Shapes: block samples each
+/// Errors: false if memory is short
+bool evidence_signals(const struct evidence *self, const struct sim_model *model, double *out_mechanics,
+                      double *out_actuator);
+
+/// Whitens residual signals of the block (actuator NULL: zeros; kinematics: zeros).
 void evidence_whiten(const struct evidence *self, const double *mechanics, const double *actuator,
                      double *out_whitened);
 
@@ -46,7 +64,7 @@ void evidence_whiten(const struct evidence *self, const double *mechanics, const
 /// out: 2 (band + 1) values.
 void evidence_transform(const struct evidence *self, const double *signal, double *out_spectrum);
 
-/// Bin that value number i of a whitened residual belongs to, and its channel.
+/// Bin that value number i of a whitened residual belongs to, and its channel: 0 mechanics, 1 actuator, 2 kinematics.
 size_t evidence_bin(const struct evidence *self, size_t i, size_t *out_channel);
 
 #endif

@@ -17,6 +17,8 @@ static void stretch_free(struct stretch *s)
     free(s->torque);
     free(s->position);
     free(s->velocity);
+    free(s->kinematics);
+    free(s->lost);
 }
 
 void recording_free(struct recording *self)
@@ -28,9 +30,10 @@ void recording_free(struct recording *self)
     memset(self, 0, sizeof *self);
 }
 
+/// NULL for a column that is not there, or if memory is short.
 static double *copied(const double *data, size_t count)
 {
-    double *copy = malloc(count * sizeof *copy);
+    double *copy = data ? malloc(count * sizeof *copy) : NULL;
     if (copy)
         memcpy(copy, data, count * sizeof *copy);
     return copy;
@@ -49,6 +52,61 @@ static int refuse_column(const struct run *run, const char *what, const char *ro
                      run->path ? run->path : "run", what, rotary, linear);
 }
 
+static int refuse_memory(const struct run *run, struct error *out_error)
+{
+    return error_set(out_error, error_refused, "%s: not enough memory for %zu rows", run->path, run->rows);
+}
+
+/// Rows that were not measured, by the file's word or by what they look like.
+static int find_lost(const struct run *run, struct recording *r, struct error *out_error)
+{
+    const size_t most_share = 3; // of the rows: with more gone nobody knows what moved
+    r->all.lost = calloc(run->rows, sizeof *r->all.lost);
+    if (!r->all.lost)
+        return refuse_memory(run, out_error);
+    r->filled = repair_find(run, r->all.lost, &r->finding);
+    if (r->filled <= run->rows / most_share)
+        return 0;
+    return error_set(out_error, error_refused,
+                     "%s: %zu of %zu rows were lost or repeat the row before; diagnosis needs two thirds of them",
+                     run->path, r->filled, run->rows);
+}
+
+static bool fill_columns(struct recording *r, double *position, double *velocity)
+{
+    double *columns[] = {r->all.torque, position, velocity};
+    size_t period = r->periodic ? r->block.samples : 0;
+    for (size_t i = 0; r->filled > 0 && i < sizeof columns / sizeof columns[0]; i++)
+        if (columns[i] && !repair_fill(r->all.samples, r->all.lost, period, columns[i]))
+            return false;
+    return true;
+}
+
+/// After the columns were filled: a period knows its lost rows from the other periods, a run without periods has
+/// nothing but a guess there, and predictions have to keep off it.
+static bool settle_lost(struct recording *r)
+{
+    if (r->periodic || r->filled == 0) {
+        free(r->all.lost);
+        r->all.lost = NULL;
+        return true;
+    }
+    r->block.lost = malloc(r->block.samples * sizeof *r->block.lost);
+    if (r->block.lost)
+        memcpy(r->block.lost, r->all.lost, r->block.samples * sizeof *r->block.lost);
+    return r->block.lost != NULL;
+}
+
+static bool take_motion(struct recording *r, const double *position, const double *velocity)
+{
+    size_t rows = r->all.samples, period = r->periodic ? r->block.samples : 0;
+    r->all.position = malloc(rows * sizeof(double));
+    r->all.velocity = malloc(rows * sizeof(double));
+    return r->all.position && r->all.velocity &&
+           motion_estimate(rows, r->rate_hz, position, velocity, period, &r->all, r->motion_from,
+                           sizeof r->motion_from);
+}
+
 static int take_columns(const struct run *run, struct recording *r, struct error *out_error)
 {
     const double *torque = either(run, "torque_Nm", "force_N");
@@ -59,22 +117,21 @@ static int take_columns(const struct run *run, struct recording *r, struct error
         return refuse_column(run, "torque", "torque_Nm", "force_N", out_error);
     if (!position && !velocity)
         return refuse_column(run, "motion", "position_rad", "position_m", out_error);
-    size_t rows = run->rows;
-    r->all.samples = rows;
-    r->all.torque = copied(torque, rows);
-    r->all.torque_ref = reference ? copied(reference, rows) : NULL;
-    r->all.position = malloc(rows * sizeof(double));
-    r->all.velocity = malloc(rows * sizeof(double));
-    if (!r->all.torque || (reference && !r->all.torque_ref) || !r->all.position || !r->all.velocity ||
-        !motion_estimate(rows, run->sample_rate_hz, position, velocity, r->periodic ? r->block.samples : 0, &r->all,
-                         r->motion_from, sizeof r->motion_from))
-        return error_set(out_error, error_refused, "%s: not enough memory for %zu rows", run->path, rows);
-    return 0;
+    r->all.samples = run->rows;
+    r->all.torque = copied(torque, run->rows);
+    r->all.torque_ref = copied(reference, run->rows);
+    double *raw_position = copied(position, run->rows), *raw_velocity = copied(velocity, run->rows);
+    bool copies = r->all.torque && (!reference || r->all.torque_ref) && (!position || raw_position) &&
+                  (!velocity || raw_velocity);
+    bool good = copies && fill_columns(r, raw_position, raw_velocity) && take_motion(r, raw_position, raw_velocity);
+    free(raw_position);
+    free(raw_velocity);
+    return good ? 0 : refuse_memory(run, out_error);
 }
 
 /// The run's own word, else what its torque repeats after; only repetitions as good and as many as a multisine's are
 /// believed.
-static size_t find_period(const struct run *run)
+static size_t find_period(const struct run *run, struct oddities *io_oddities)
 {
     const double nearly_exact = 0.99;
     const size_t fewest = 5; // fewer leave nothing to average, and a start to throw away
@@ -82,7 +139,7 @@ static size_t find_period(const struct run *run)
     const double *torque = either(run, "torque_Nm", "force_N");
     struct period_search search;
     if (run->period_samples > 0)
-        return run->period_samples;
+        return oddities_period(run, reference ? reference : torque, io_oddities);
     if (!torque || period_search_run(reference ? reference : torque, run->rows, &search) != period_search_ok)
         return 0;
     bool often = run->rows >= fewest * search.period_samples;
@@ -92,7 +149,7 @@ static size_t find_period(const struct run *run)
 /// Periods that count: after the settling ones and, unless the file says how many settled, after the first.
 static void choose_periods(const struct run *run, struct recording *r)
 {
-    size_t n = find_period(run);
+    size_t n = find_period(run, &r->oddities);
     const size_t shortest = 16, fewest = 3;
     r->periodic = n >= shortest && run->rows >= fewest * n;
     if (!r->periodic)
@@ -130,32 +187,34 @@ static bool make_block(struct recording *r, size_t n)
 {
     r->block.samples = n;
     return average(r, r->all.torque_ref, n, &r->block.torque_ref) && average(r, r->all.torque, n, &r->block.torque) &&
-           average(r, r->all.position, n, &r->block.position) && average(r, r->all.velocity, n, &r->block.velocity);
+           average(r, r->all.position, n, &r->block.position) &&
+           average(r, r->all.velocity, n, &r->block.velocity) &&
+           average(r, r->all.kinematics, n, &r->block.kinematics);
 }
 
-/// Counted periods without a lost sample. A run without periods cannot leave anything out.
+/// Counted periods; those in which the file marks samples as lost are left out while half of them stay, else the
+/// marked rows are filled like any others that were not measured.
 static int choose_starts(const struct run *run, struct recording *r, struct error *out_error)
 {
     const double *valid = run_column(run, "valid");
-    size_t n = r->periodic ? r->block.samples : run->rows, kept = 0, lost = 0;
+    size_t n = r->periodic ? r->block.samples : run->rows, kept = 0;
     r->starts = calloc(r->periods, sizeof *r->starts);
     if (!r->starts)
-        return error_set(out_error, error_refused, "%s: not enough memory", run->path);
+        return refuse_memory(run, out_error);
     for (size_t p = 0; p < r->periods; p++) {
         size_t start = r->lead + p * n, gaps = 0;
         for (size_t i = start; valid && i < start + n; i++)
             gaps += valid[i] == 0.0;
-        lost += gaps;
         if (gaps == 0)
             r->starts[kept++] = start;
     }
-    size_t fewest = r->periodic ? 2 : 1, counted = r->periods;
+    if (kept < 2 || 2 * kept < r->periods) {
+        for (size_t p = 0; p < r->periods; p++)
+            r->starts[p] = r->lead + p * n;
+        kept = r->periods;
+    }
     r->periods = kept;
-    if (kept >= fewest)
-        return 0;
-    return error_set(out_error, error_refused,
-                     "%s: %zu samples were lost and spoil %zu of %zu periods; diagnosis needs %zu", run->path, lost,
-                     counted - kept, counted, fewest);
+    return 0;
 }
 
 static size_t smooth_length(size_t most)
@@ -242,22 +301,23 @@ static void choose_substeps(struct recording *r)
     r->block.substeps = r->all.substeps = slow ? 1 : sim_substeps;
 }
 
-static double torque_peak(const struct stretch *block)
+static double peak_of(size_t count, const double *values)
 {
     double peak = 0.0;
-    for (size_t i = 0; i < block->samples; i++)
-        peak = fmax(peak, fabs(block->torque[i]));
+    for (size_t i = 0; i < count; i++)
+        peak = fmax(peak, fabs(values[i]));
     return peak;
 }
 
 static void measure_coverage(struct recording *r)
 {
     const struct stretch *b = &r->block;
-    double low = b->position[0], high = low, torque = 0.0, velocity = 0.0, peak = 0.0, mean = 0.0;
+    double low = b->position[0], high = low, position = 0.0, torque = 0.0, velocity = 0.0, peak = 0.0, mean = 0.0;
     for (size_t i = 0; i < b->samples; i++) {
         low = fmin(low, b->position[i]);
         high = fmax(high, b->position[i]);
         mean += b->torque[i] / (double)b->samples;
+        position += b->position[i];
         torque += b->torque[i] * b->torque[i];
         velocity += b->velocity[i] * b->velocity[i];
         peak = fmax(peak, fabs(b->velocity[i]));
@@ -265,13 +325,35 @@ static void measure_coverage(struct recording *r)
     double n = (double)b->samples;
     r->coverage = (struct sim_coverage){
         .position_span = high - low,
+        .position_mean = position / n,
         .velocity_rms = sqrt(velocity / n),
         .velocity_peak = peak,
         .torque_rms = sqrt(fmax(torque / n - mean * mean, 0.0)),
-        .duration_s = n * (double)r->periods / r->rate_hz,
+        .torque_peak = peak_of(r->all.samples, r->all.torque),
+        .reference_peak = r->all.torque_ref ? peak_of(r->all.samples, r->all.torque_ref) : 0.0,
+        .duration_s = ((double)r->starts[r->periods - 1] + n) / r->rate_hz,
         .frequency_max_hz = (double)r->bins[r->bin_count - 1] * r->rate_hz / n,
         .linear = r->linear,
     };
+}
+
+void recording_begin(struct recording *self, double start_s)
+{
+    double before = self->all.start_s;
+    self->all.start_s = start_s;
+    self->block.start_s += start_s - before;
+    self->coverage.duration_s += start_s - before;
+}
+
+/// The clock of a mean of periods stands where it is nearest to all of them.
+static void set_clock(struct recording *r)
+{
+    double sum = 0.0;
+    for (size_t p = 0; p < r->periods; p++)
+        sum += (double)r->starts[p] / (double)r->periods;
+    if (r->periodic)
+        sum += 0.5 * (double)r->block.samples;
+    r->block.start_s = sum / r->rate_hz;
 }
 
 /// Adds to the sentence on the motion that the period is a finding of ours.
@@ -281,6 +363,38 @@ static void say_period(struct recording *r)
     snprintf(r->motion_from + used, sizeof r->motion_from - used,
              " The run repeats every %zu samples: noise is averaged over %zu repetitions instead of being filtered.",
              r->block.samples, r->periods);
+}
+
+/// Whether something moves under a torque that something can be learnt from, in numbers that a drive can have.
+static int check_scales(const struct run *run, const struct recording *r, struct error *out_error)
+{
+    const double rounding = 1e-9; // of the largest torque: less is the sum's, not the motor's
+    const double least = 1e-12, most = 1e12;
+    const struct sim_coverage *c = &r->coverage;
+    if (!(c->torque_rms > rounding * peak_of(r->block.samples, r->block.torque)))
+        return error_set(out_error, error_refused, "%s: the torque is constant: nothing was excited", run->path);
+    if (!(c->velocity_rms > 0.0 && c->position_span > 0.0))
+        return error_set(out_error, error_refused, "%s: the axis does not move", run->path);
+    double values[] = {c->torque_rms, c->velocity_rms, c->position_span};
+    static const char *const names[] = {"torque RMS", "speed RMS", "travelled range"};
+    for (size_t i = 0; i < sizeof values / sizeof values[0]; i++)
+        if (!(values[i] >= least && values[i] <= most))
+            return error_set(out_error, error_refused, "%s: %s of %.3g in SI units; a drive has %.0e to %.0e",
+                             run->path, names[i], values[i], least, most);
+    return 0;
+}
+
+/// What the block is about: band, clock, coverage, and what is odd about the run.
+static int describe(const struct run *run, struct recording *r, struct error *out_error)
+{
+    oddities_of_run(run, r, &r->oddities);
+    if (strncmp(r->motion_from, "The speed column", 16) == 0)
+        oddities_add(&r->oddities, "%s: %s", run->path ? run->path : "run", r->motion_from);
+    choose_band(r);
+    choose_substeps(r);
+    set_clock(r);
+    measure_coverage(r);
+    return check_scales(run, r, out_error);
 }
 
 int recording_prepare(const struct run *run, struct recording *out_recording, struct error *out_error)
@@ -295,25 +409,19 @@ int recording_prepare(const struct run *run, struct recording *out_recording, st
         return error_set(out_error, error_refused, "%s: %zu rows; diagnosis needs at least %zu", run->path, run->rows,
                          fewest);
     choose_periods(run, r);
-    int status = take_columns(run, r, out_error);
+    int status = find_lost(run, r, out_error);
+    if (status == 0)
+        status = take_columns(run, r, out_error);
     if (r->periodic && run->period_samples == 0)
         say_period(r);
     if (status == 0)
         status = choose_starts(run, r, out_error);
-    if (status == 0 && !make_block(r, r->periodic ? r->block.samples : smooth_length(run->rows)))
+    if (status == 0 && !(make_block(r, r->periodic ? r->block.samples : smooth_length(run->rows)) && settle_lost(r)))
         status = error_set(out_error, error_refused, "%s: not enough memory", run->path);
     if (status == 0 && !choose_bins(run, r))
         status = error_set(out_error, error_refused, "%s: the torque is constant: nothing was excited", run->path);
-    if (status == 0) {
-        choose_band(r);
-        choose_substeps(r);
-        measure_coverage(r);
-        const double rounding = 1e-9; // of the largest torque: less is the sum's, not the motor's
-        if (!(r->coverage.torque_rms > rounding * torque_peak(&r->block)))
-            status = error_set(out_error, error_refused, "%s: the torque is constant: nothing was excited", run->path);
-        else if (!(r->coverage.velocity_rms > 0.0 && r->coverage.position_span > 0.0))
-            status = error_set(out_error, error_refused, "%s: the axis does not move", run->path);
-    }
+    if (status == 0)
+        status = describe(run, r, out_error);
     if (status != 0)
         recording_free(r);
     return status;

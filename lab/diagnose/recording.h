@@ -5,6 +5,8 @@
 #ifndef SERVOSCOPE_DIAGNOSE_RECORDING_H
 #define SERVOSCOPE_DIAGNOSE_RECORDING_H
 
+#include "lab/diagnose/oddities.h"
+#include "lab/diagnose/repair.h"
 #include "lab/record/error.h"
 #include "lab/record/run.h"
 #include "sim/effect.h"
@@ -19,7 +21,11 @@ struct stretch {
     double *torque_ref; ///< NULL: the run has none; then the measured torque drives the model
     double *torque;
     double *position;
-    double *velocity; ///< best estimate from the position and, if there is one, the speed column
+    double *velocity;   ///< best estimate from the position and, if there is one, the speed column
+    double *kinematics; ///< speed column less the derivative of the position column; NULL: not both are there
+    double start_s;     ///< time of the first sample since the run began; of a mean of periods the middle of them all,
+                        ///< where the clock of effects that depend on time stands still
+    bool *lost;         ///< rows that were not measured: NULL if there are none, and in a mean of periods
 };
 
 struct recording {
@@ -34,6 +40,9 @@ struct recording {
     size_t *bins;
     size_t band; ///< highest bin of the block that is looked at
     struct sim_coverage coverage;
+    size_t filled; ///< rows that were not measured, filled with what is about them
+    struct repair_finding finding;
+    struct oddities oddities;
     char motion_from[280]; ///< one sentence: how the speed was made, with the filter's figures
 };
 
@@ -41,5 +50,8 @@ struct recording {
 /// or nothing moves; the message names the file and what was expected.
 int recording_prepare(const struct run *run, struct recording *out_recording, struct error *out_error);
 void recording_free(struct recording *self);
+
+/// Says when, in seconds since the run began, the rows of a recording begin that is a part of a run.
+void recording_begin(struct recording *self, double start_s);
 
 #endif

@@ -93,6 +93,8 @@ static void add_given(struct page *page, const struct diagnosis *self)
     if (self->motion_from[0] != '\0') {
         page_add_pair(page, "Motion", "%s", self->motion_from);
     }
+    for (size_t i = 0; i < self->oddities.count; i++)
+        page_add_pair(page, "Note", "%s", self->oddities.texts[i]);
     if (self->curves.rate_hz > 0.0 && self->curves.samples > 0) {
         page_add_pair(page, "Curves below", "%zu samples at %.6g Hz (%.4g s) of the data judged on",
                       self->curves.samples, self->curves.rate_hz, (double)self->curves.samples / self->curves.rate_hz);

@@ -13,7 +13,8 @@ double search_threshold(const struct fit_data *data, int effect)
 {
     const double floor_nats = 12.0;
     double parameters = (double)sim_effects[effect]->parameter_count;
-    return floor_nats + 0.5 * parameters * log((double)data->values);
+    size_t values = data->values + (sim_effects[effect]->in_time ? data->contrasts : 0);
+    return floor_nats + 0.5 * parameters * log((double)values);
 }
 
 struct candidate {
@@ -40,7 +41,7 @@ static size_t quick_columns(const struct fit_data *data, int effect, const doubl
                 size_t next = n + 1 < r->block.samples ? n + 1 : n;
                 struct sim_motion at = {.position = 0.5 * (r->block.position[n] + r->block.position[next]),
                                         .velocity = 0.5 * (r->block.velocity[n] + r->block.velocity[next]),
-                                        .time_s = (double)n / r->rate_hz,
+                                        .time_s = r->block.start_s + (double)n / r->rate_hz,
                                         .linear = r->linear};
                 struct sim_opposing o = {.positive_factor = 1.0, .negative_factor = 1.0};
                 e->oppose(p, &at, &o);
@@ -62,10 +63,7 @@ static double quick_cost(const struct fit_data *data, const struct hypothesis *h
     double *A = work, *b = A + rows * (m + 2), *signal = b + rows;
     double weight[hypothesis_coordinates_max + 2] = {0}, centre[hypothesis_coordinates_max + 2] = {0};
     double x[hypothesis_coordinates_max + 2];
-    for (size_t i = 0; i < m; i++) {
-        weight[i] = h->coordinates[i].weight;
-        centre[i] = h->coordinates[i].centre - h->x[i];
-    }
+    fit_linear(fit, data, h, A, weight, centre);
     size_t columns = quick_columns(data, effect, io_values, signal, A + rows * m);
     m += columns;
     for (size_t j = 0; j < rows; j++)
@@ -124,7 +122,6 @@ static size_t choose_valleys(const struct fit_data *data, const struct hypothesi
     double *work = malloc((data->values * (from->count + 3) + longest_block(data)) * sizeof *work);
     if (!work)
         return 0;
-    memcpy(work, fit->jacobian, data->values * from->count * sizeof *work);
     for (size_t i = 0; i < total; i++)
         points[i].cost = quick_cost(data, from, fit, effect, points[i].values, work);
     free(work);
@@ -142,6 +139,22 @@ static size_t choose_valleys(const struct fit_data *data, const struct hypothesi
     return count;
 }
 
+/// Gives scan values of an effect in time their size and phase: a frequency far from small is no place to step from.
+static void size_in_time(const struct fit_data *data, const struct hypothesis *from, const struct fit *fit, int effect,
+                         double values[][sim_effect_parameters_max], size_t count)
+{
+    struct sim_model current;
+    hypothesis_model(from, NULL, &current);
+    double *work = malloc((data->values * (from->count + 3) + longest_block(data)) * sizeof *work);
+    for (size_t i = 0; work && i < count; i++) {
+        if (data->contrasts > 0)
+            contrast_size_effect(&data->evidence[0], &current, effect, values[i]);
+        else if (sim_effects[effect]->oppose)
+            quick_cost(data, from, fit, effect, values[i], work);
+    }
+    free(work);
+}
+
 /// Scan values worth a real step: all of a short scan, the best valleys of a long one.
 static size_t choose_scan(const struct fit_data *data, const struct sim_coverage *coverage,
                           const struct hypothesis *from, const struct fit *fit, int effect,
@@ -152,13 +165,19 @@ static size_t choose_scan(const struct fit_data *data, const struct sim_coverage
     const struct sim_effect *e = sim_effects[effect];
     double values[sim_effect_parameters_max] = {0};
     size_t total = 0, count = 0;
+    if (contrast_is_line(effect) && coverage->tone_count == 0)
+        return 0;
     while (e->scan(&current, coverage, total, values)) {
         if (total < sim_effect_scan_max)
             memcpy(out_values[total], values, sizeof values);
         total++;
     }
-    if (total <= sim_effect_scan_max || !e->oppose)
-        return total < sim_effect_scan_max ? total : sim_effect_scan_max;
+    if (total <= sim_effect_scan_max || !e->oppose) {
+        count = total < sim_effect_scan_max ? total : sim_effect_scan_max;
+        if (e->in_time)
+            size_in_time(data, from, fit, effect, out_values, count);
+        return count;
+    }
     struct scan_point *points = calloc(total, sizeof *points);
     if (points) {
         for (size_t i = 0; i < total; i++)
@@ -173,6 +192,13 @@ static int by_cost(const void *a, const void *b)
 {
     double x = ((const struct candidate *)a)->cost, y = ((const struct candidate *)b)->cost;
     return (x > y) - (x < y);
+}
+
+/// Whether an effect changes what the model is made of, rather than adding to what acts on it.
+static bool restructures(int effect, const struct hypothesis *from, const struct hypothesis *trial)
+{
+    const struct sim_effect *e = sim_effects[effect];
+    return trial->engaged.structure != from->engaged.structure || e->attach || e->bend || e->build_up;
 }
 
 /// Where the structure changes, derivatives of the old one are worth nothing: every scan value gets one step of its
@@ -210,7 +236,7 @@ static bool scan_effect(struct fit *scratch, const struct fit_data *data, const 
     for (size_t i = 0; i < count; i++) {
         struct hypothesis trial = *from;
         hypothesis_name(&trial, effect, values[i]);
-        if (trial.engaged.structure != from->engaged.structure) {
+        if (restructures(effect, from, &trial)) {
             scan_restructured(scratch, data, from, effect, values, count, out);
             break;
         }

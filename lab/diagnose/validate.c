@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/diagnose/validate.h"
 
-#include "lab/diagnose/predict.h"
 #include "lab/numeric/fft.h"
 #include "sim/plant.h"
 
@@ -34,7 +33,10 @@ static bool spectra_of(const struct evidence *e, const struct sim_model *model, 
     out->mechanics = out->signals + 2 * n;
     out->actuator = out->mechanics + 2 * bins;
     out->torque = out->actuator + 2 * bins;
-    predict(model, &r->block, r->periodic, e->scale_inertia, out->signals, out->signals + n);
+    if (!evidence_signals(e, model, out->signals, out->signals + n)) {
+        free(out->signals);
+        return false;
+    }
     double share = motor_share(e, model);
     for (size_t i = 0; i < n; i++)
         out->signals[i] *= share;
@@ -58,17 +60,29 @@ static double error_at(const struct evidence *e, const struct spectra *s, size_t
     return square(a[0] - m[0], a[1] - m[1]) + square(a[0], a[1]);
 }
 
-struct diagnosis_figures validate_figures(const struct fit_data *data, const struct sim_model *model)
+/// Mean square of the whitened residuals; of a contrast's deviations from the mean of P periods P - 1 in P are free.
+static double whitened_mean_square(const struct fit_data *data, const struct sim_model *model, bool in_time)
+{
+    double sum = 0.0, count = (double)data->values;
+    double *residual = malloc((data->values + data->contrasts) * sizeof *residual);
+    if (!residual)
+        return NAN;
+    size_t rows = fit_residual(data, model, residual);
+    for (size_t i = 0; i < (in_time ? rows : data->values); i++)
+        sum += residual[i] * residual[i];
+    free(residual);
+    for (size_t i = 0; in_time && data->contrasts > 0 && i < data->runs; i++) {
+        const struct evidence *e = &data->evidence[i];
+        sum += rows > data->values ? 0.0 : e->contrast.without;
+        count += (double)e->contrast.values * (1.0 - 1.0 / (double)e->recording->periods);
+    }
+    return sum / count;
+}
+
+struct diagnosis_figures validate_figures(const struct fit_data *data, const struct sim_model *model, bool in_time)
 {
     struct diagnosis_figures figures = {NAN, NAN};
-    double error = 0.0, torque = 0.0, whitened = 0.0;
-    double *residual = malloc(data->values * sizeof *residual);
-    if (!residual)
-        return figures;
-    fit_residual(data, model, residual);
-    for (size_t i = 0; i < data->values; i++)
-        whitened += residual[i] * residual[i];
-    free(residual);
+    double error = 0.0, torque = 0.0, whitened = whitened_mean_square(data, model, in_time);
     for (size_t i = 0; i < data->runs; i++) {
         const struct evidence *e = &data->evidence[i];
         struct spectra s;
@@ -83,7 +97,7 @@ struct diagnosis_figures validate_figures(const struct fit_data *data, const str
         free(s.signals);
     }
     figures.validation_nrmse = sqrt(error / torque);
-    figures.whitened_rms = sqrt(whitened / (double)data->values);
+    figures.whitened_rms = sqrt(whitened);
     return figures;
 }
 

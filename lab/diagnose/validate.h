@@ -15,8 +15,8 @@
 ///            for the measured motion is off from the measured torque; the second, there only with a torque reference,
 ///            is
 ///            what the model's actuator is off, which the first cannot see.
-///            whitened_rms^2 = mean of squared whitened residuals.
-struct diagnosis_figures validate_figures(const struct fit_data *data, const struct sim_model *model);
+///            whitened_rms^2 = mean of squared whitened residuals, with `in_time` those of the contrasts among them.
+struct diagnosis_figures validate_figures(const struct fit_data *data, const struct sim_model *model, bool in_time);
 
 /// The same nrmse for a perfect model: from the noise; without periods from the spectrum above the excited band.
 double validate_noise_floor(const struct fit_data *data, const struct sim_model *model);

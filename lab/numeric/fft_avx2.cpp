@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/numeric/fft_code.hpp"
 
-// These stay outside the pragma: what they define inline may be shared with the rest of the program. <complex> is
-// inside: its functions are only used on a type of this file, and have to be inlined.
+// These stay outside the pragma: what they define inline may be shared with the rest of the program.
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <new>
-#include <sstream>
 #include <utility>
 #include <vector>
 

@@ -1,217 +1,232 @@
 /* SPDX-License-Identifier: MIT */
-// Four interleaved transforms of a quarter of the length at once, one in each lane of a vector, on KissFFT's template:
-// twice as fast as one transform of the whole length with 128-bit registers, more than three times with 256-bit ones.
+// Transforms with a vector's four lanes.
 // Included by one source file per instruction set. Everything here has internal linkage, so that the linker cannot mix
-// them; the operations and their order are the same, and so is every bit of the result.
+// them, and no template of the standard library is used on a type that others use; the operations and their order are the
+// same, and so is every bit of the result.
 #include "lab/numeric/fft_code.hpp"
+#include "lab/numeric/fft_passes.hpp"
 
-#include <complex>
+#include <cmath>
 #include <cstddef>
-#include <kissfft/kissfft.hh>
 #include <new>
 #include <vector>
 
 namespace
 {
 
-enum { lane_count = 4 };
-
-/// Four doubles that behave as one number, as far as KissFFT needs it.
-struct lanes {
-    // Said, because without AVX the compiler would settle for less, and both must agree.
-    typedef double vector
-        __attribute__((vector_size(lane_count * sizeof(double)), aligned(lane_count * sizeof(double))));
-    vector value;
-
-    lanes() : value{0.0, 0.0, 0.0, 0.0} {}
-    lanes(double x) : value{x, x, x, x} {}
-    lanes(double x0, double x1, double x2, double x3) : value{x0, x1, x2, x3} {}
-    /// Not left to the compiler: so a lanes is handed over in memory, and functions compiled for other instruction sets
-    /// (those of the standard headers) agree with these on how. And it is copied as one vector.
-    lanes(const lanes &other) : value(other.value) {}
-    lanes &operator=(const lanes &other)
-    {
-        value = other.value;
-        return *this;
-    }
-    /// KissFFT asks std::acos for pi; it is the same in every lane.
-    operator double() const
-    {
-        return value[0];
-    }
-    lanes operator-() const
-    {
-        lanes result;
-        result.value = -value;
-        return result;
-    }
-    lanes &operator+=(const lanes &other)
-    {
-        value += other.value;
-        return *this;
-    }
-    lanes &operator-=(const lanes &other)
-    {
-        value -= other.value;
-        return *this;
-    }
-    lanes &operator*=(const lanes &other)
-    {
-        value *= other.value;
-        return *this;
-    }
+struct part {
+    double value;
 };
 
-inline lanes operator+(const lanes &left, const lanes &right)
-{
-    lanes result(left);
-    return result += right;
-}
+struct transform {
+    transform() = default;
+    transform(const transform &) = delete;
+    transform &operator=(const transform &) = delete;
+    virtual ~transform() = default;
+    virtual void run(const complex_source &source, double *out) const = 0;
+    virtual void run(const pair_source &source, double *out) const = 0;
+};
 
-inline lanes operator-(const lanes &left, const lanes &right)
-{
-    lanes result(left);
-    return result -= right;
-}
-
-inline lanes operator*(const lanes &left, const lanes &right)
-{
-    lanes result(left);
-    return result *= right;
-}
-
-inline lanes operator*(std::size_t left, const lanes &right)
-{
-    return lanes(static_cast<double>(left)) *= right;
-}
-
-// Found by argument-dependent look-up when the twiddles are made; all lanes are equal there.
-inline lanes exp(const lanes &x)
-{
-    return lanes(std::exp(static_cast<double>(x)));
-}
-
-inline lanes cos(const lanes &x)
-{
-    return lanes(std::cos(static_cast<double>(x)));
-}
-
-inline lanes sin(const lanes &x)
-{
-    return lanes(std::sin(static_cast<double>(x)));
-}
-
-/// x[4m + l] is transformed in lane l; the last butterfly puts the four together.
-class lanes_transform
+/// Multiples of four: four interleaved transforms of a quarter of the length at once, x[4m + l] in lane l; a last
+/// butterfly puts the four together.
+class quarters_transform final : public transform
 {
   public:
-    explicit lanes_transform(std::size_t length)
-        : quarter_(length / lane_count), transform_(quarter_, false), twiddles_(quarter_), in_(quarter_), out_(quarter_)
+    explicit quarters_transform(std::size_t length) : quarters_transform(length, roots(length)) {}
+
+    void run(const complex_source &source, double *out) const override
     {
-        // A quarter of a turn: the cosine of one angle is the sine of another.
-        const double step = 2.0 * std::acos(-1.0) / static_cast<double>(length);
-        std::vector<double> sines(quarter_ + 1);
-        for (std::size_t k = 0; k <= quarter_; k++) {
-            sines[k] = std::sin(step * static_cast<double>(k));
-        }
-        for (std::size_t k = 0; k < quarter_; k++) {
-            const double c1 = sines[quarter_ - k];
-            const double s1 = -sines[k];
-            const double c2 = c1 * c1 - s1 * s1;
-            const double s2 = 2.0 * c1 * s1;
-            twiddles_[k] = number(lanes(1.0, c1, c2, c2 * c1 - s2 * s1), lanes(0.0, s1, s2, c2 * s1 + s2 * c1));
-        }
+        passes_.run(source, work_.data());
+        finish(out, source.swapped);
     }
 
-    /// `swapped`: real and imaginary parts change places in and out, which makes the inverse transform.
-    void run(const double *in, double *out, bool swapped) const
+    void run(const pair_source &source, double *out) const override
     {
-        vector *filled = reinterpret_cast<vector *>(in_.data());
-        for (std::size_t m = 0; m < quarter_; m++) {
-            const double *x = in + 2 * lane_count * m;
-            filled[2 * m + swapped] = vector{x[0], x[2], x[4], x[6]};
-            filled[2 * m + !swapped] = vector{x[1], x[3], x[5], x[7]};
-        }
-        finish(out, swapped);
-    }
-
-    /// a scaled by `scale_a` is the real part of what is transformed, b the imaginary one.
-    void run_pair(const double *a, double scale_a, const double *b, double scale_b, double *out) const
-    {
-        vector *filled = reinterpret_cast<vector *>(in_.data());
-        for (std::size_t m = 0; m < quarter_; m++) {
-            const double *x = a + lane_count * m;
-            const double *y = b + lane_count * m;
-            filled[2 * m] = scale_a * vector{x[0], x[1], x[2], x[3]};
-            filled[2 * m + 1] = scale_b * vector{y[0], y[1], y[2], y[3]};
-        }
+        passes_.run(source, work_.data());
         finish(out, false);
     }
 
   private:
-    typedef lanes::vector vector;
-    typedef std::complex<lanes> number;
-
-    void finish(double *out, bool swapped) const
+    quarters_transform(std::size_t length, const roots &turns)
+        : quarter_(length / lane_count), passes_(quarter_, turns, lane_count), turns_(2 * quarter_), work_(quarter_)
     {
-        transform_.transform(in_.data(), out_.data());
-        // As vectors, not as complex numbers: their copies move in smaller pieces, and reading those back stalls.
-        const vector *values = reinterpret_cast<const vector *>(out_.data());
-        const vector *factors = reinterpret_cast<const vector *>(twiddles_.data());
         for (std::size_t k = 0; k < quarter_; k++) {
-            const vector re = values[2 * k] * factors[2 * k] - values[2 * k + 1] * factors[2 * k + 1];
-            const vector im = values[2 * k] * factors[2 * k + 1] + values[2 * k + 1] * factors[2 * k];
-            butterfly(re, im, out + 2 * k + swapped, out + 2 * k + !swapped);
+            const factor root = turns[k];
+            turns_[k].value = root.re;
+            turns_[quarter_ + k].value = root.im;
         }
     }
 
-    /// X[k + jN/4] = sum_l (-i)^(lj) a_l
-    void butterfly(const vector &re, const vector &im, double *out_re, double *out_im) const
+    /// X[k + jN/4] = sum_l (-i)^(lj) w_N^(lk) Y_l[k], four lines k at a time; the last four may overlap those before.
+    void finish(double *out, bool swapped) const
     {
-        const std::size_t step = 2 * quarter_;
-        const double even_re = re[0] + re[2];
-        const double even_im = im[0] + im[2];
-        const double odd_re = re[1] + re[3];
-        const double odd_im = im[1] + im[3];
-        const double minus_re = re[0] - re[2];
-        const double minus_im = im[0] - im[2];
-        const double turned_re = im[1] - im[3];
-        const double turned_im = re[3] - re[1];
-        out_re[0] = even_re + odd_re;
-        out_im[0] = even_im + odd_im;
-        out_re[step] = minus_re + turned_re;
-        out_im[step] = minus_im + turned_im;
-        out_re[2 * step] = even_re - odd_re;
-        out_im[2 * step] = even_im - odd_im;
-        out_re[3 * step] = minus_re - turned_re;
-        out_im[3 * step] = minus_im - turned_im;
+        for (std::size_t k = 0; k < quarter_; k += lane_count) {
+            finish_four(k + lane_count <= quarter_ ? k : quarter_ - lane_count, out, swapped);
+        }
+    }
+
+    void finish_four(std::size_t k, double *out, bool swapped) const
+    {
+        const number &row0 = work_[passes_.order(k)];
+        const number &row1 = work_[passes_.order(k + 1)];
+        const number &row2 = work_[passes_.order(k + 2)];
+        const number &row3 = work_[passes_.order(k + 3)];
+        number x[lane_count];
+        number once, twice, thrice;
+        once.re = *reinterpret_cast<const anywhere *>(&turns_[k]);
+        once.im = *reinterpret_cast<const anywhere *>(&turns_[quarter_ + k]);
+        multiply(once, once, twice);
+        multiply(twice, once, thrice);
+        vector re[lane_count];
+        vector im[lane_count];
+        transpose(row0.re, row1.re, row2.re, row3.re, re);
+        transpose(row0.im, row1.im, row2.im, row3.im, im);
+        for (std::size_t l = 0; l < lane_count; l++) {
+            x[l].re = re[l];
+            x[l].im = im[l];
+        }
+        multiply(x[1], once, x[1]);
+        multiply(x[2], twice, x[2]);
+        multiply(x[3], thrice, x[3]);
+        butterfly4()(x);
+        for (std::size_t j = 0; j < lane_count; j++) {
+            store(x[j], swapped, out + 2 * (k + j * quarter_));
+        }
     }
 
     std::size_t quarter_;
-    kissfft<lanes> transform_;
-    std::vector<number> twiddles_;
-    mutable std::vector<number> in_;
-    mutable std::vector<number> out_;
+    lane_passes passes_;
+    std::vector<part> turns_; ///< real parts of w_N^k, then imaginary ones
+    mutable std::vector<number> work_;
 };
 
-void *create_lanes(std::size_t length)
+/// Multiples m p of an odd p: a first pass of radix p makes p transforms of m points, of which four at a time have a lane
+/// each. A few lanes stay without one.
+class split_transform final : public transform
 {
-    return new lanes_transform(length);
+  public:
+    split_transform(std::size_t length, std::size_t radix) : split_transform(length, radix, roots(length)) {}
+
+    void run(const complex_source &source, double *out) const override
+    {
+        run_any_source(source, out, source.swapped);
+    }
+
+    void run(const pair_source &source, double *out) const override
+    {
+        run_any_source(source, out, false);
+    }
+
+  private:
+    split_transform(std::size_t length, std::size_t radix, const roots &turns)
+        : radix_(radix), groups_((radix + lane_count - 1) / lane_count), m_(length / radix), passes_(m_, turns, radix),
+          turns_(2 * length), work_(groups_ * m_)
+    {
+        first_.radix = radix;
+        first_.length = radix;
+        for (std::size_t r = 0; r < radix_; r++) {
+            first_.roots.push_back(turns[r * m_]);
+            for (std::size_t j = 0; j < m_; j++) {
+                const factor root = turns[r * j];
+                turns_[2 * r * m_ + j].value = root.re;
+                turns_[(2 * r + 1) * m_ + j].value = root.im;
+            }
+        }
+    }
+
+    template <class Source>
+    void run_any_source(const Source &source, double *out, bool swapped) const
+    {
+        for (std::size_t j = 0; j < m_; j += lane_count) {
+            split_four(source, j + lane_count <= m_ ? j : m_ - lane_count);
+        }
+        for (std::size_t g = 0; g < groups_; g++) {
+            passes_.run(&work_[g * m_]);
+        }
+        finish(out, swapped);
+    }
+
+    /// y_r[j] = w_N^(r j) sum_q x[j + q m] w_p^(q r), four j at a time; the last four may overlap those before.
+    template <class Source>
+    void split_four(const Source &source, std::size_t j) const
+    {
+        number x[fft_largest_split / lane_count * lane_count + lane_count];
+        for (std::size_t q = 0; q < radix_; q++) {
+            source.load_from(j + q * m_, x[q]);
+        }
+        for (std::size_t q = radix_; q < lane_count * groups_; q++) {
+            x[q].re = x[q].im = vector{0.0, 0.0, 0.0, 0.0};
+        }
+        run_pass(first_, work_source{x}, 1, x);
+        for (std::size_t r = 1; r < radix_; r++) {
+            number root;
+            root.re = *reinterpret_cast<const anywhere *>(&turns_[2 * r * m_ + j]);
+            root.im = *reinterpret_cast<const anywhere *>(&turns_[(2 * r + 1) * m_ + j]);
+            multiply(x[r], root, x[r]);
+        }
+        for (std::size_t g = 0; g < groups_; g++) {
+            const number *rows = x + lane_count * g;
+            vector re[lane_count];
+            vector im[lane_count];
+            transpose(rows[0].re, rows[1].re, rows[2].re, rows[3].re, re);
+            transpose(rows[0].im, rows[1].im, rows[2].im, rows[3].im, im);
+            for (std::size_t l = 0; l < lane_count; l++) {
+                work_[g * m_ + j + l].re = re[l];
+                work_[g * m_ + j + l].im = im[l];
+            }
+        }
+    }
+
+    /// X[r + p k] from lane r. What lanes without a transform write is overwritten by the next k; the last has none.
+    void finish(double *out, bool swapped) const
+    {
+        const std::size_t length = m_ * radix_;
+        for (std::size_t k = 0; k < m_; k++) {
+            for (std::size_t g = 0; g < groups_; g++) {
+                const std::size_t line = radix_ * k + lane_count * g;
+                const number &x = work_[g * m_ + passes_.order(k)];
+                if (line + lane_count <= length) {
+                    store(x, swapped, out + 2 * line);
+                    continue;
+                }
+                for (std::size_t r = 0; line + r < length; r++) {
+                    out[2 * (line + r)] = swapped ? x.im[r] : x.re[r];
+                    out[2 * (line + r) + 1] = swapped ? x.re[r] : x.im[r];
+                }
+            }
+        }
+    }
+
+    std::size_t radix_;
+    std::size_t groups_; ///< of four lanes
+    std::size_t m_;
+    lane_passes passes_;
+    pass first_;
+    std::vector<part> turns_; ///< w_N^(r j): real parts for all j, then imaginary ones, for one r after the other
+    mutable std::vector<number> work_;
+};
+
+void *create_lanes(std::size_t length, std::size_t split)
+{
+    if (split == lane_count) {
+        return static_cast<transform *>(new quarters_transform(length));
+    }
+    return static_cast<transform *>(new split_transform(length, split));
 }
 
 void destroy_lanes(void *self)
 {
-    delete static_cast<lanes_transform *>(self);
+    delete static_cast<transform *>(self);
 }
 
 void run_lanes(const void *self, const double *in, double *out, bool swapped)
 {
-    static_cast<const lanes_transform *>(self)->run(in, out, swapped);
+    static_cast<const transform *>(self)->run(complex_source{in, swapped}, out);
 }
 
 void run_lanes_pair(const void *self, const double *a, double scale_a, const double *b, double scale_b, double *out)
 {
-    static_cast<const lanes_transform *>(self)->run_pair(a, scale_a, b, scale_b, out);
+    static_cast<const transform *>(self)->run(pair_source{a, scale_a, b, scale_b}, out);
 }
 
 const fft_code lanes_code = {create_lanes, destroy_lanes, run_lanes, run_lanes_pair};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/// Sums over vectors, added in order, so that they come out the same on every machine.
+/// Sums over vectors, added in a given order, so that they come out the same on every machine.
 #ifndef SERVOSCOPE_NUMERIC_VECTOR_H
 #define SERVOSCOPE_NUMERIC_VECTOR_H
 
@@ -7,6 +7,11 @@
 
 /// sum_i a_i b_i
 double vector_dot(size_t count, const double *a, const double *b);
+
+/// sum_i a_i, and sum_i a_i^2, for long vectors: several partial sums beside each other in an order of their own, because
+/// one would wait for its own last addition.
+double vector_sum(size_t count, const double *a);
+double vector_power(size_t count, const double *a);
 
 /// Root of the sum of squares.
 double vector_length(size_t count, const double *x);

@@ -1,0 +1,289 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/diagnose/structure.h"
+
+#include "lab/numeric/fft.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { cells = 16, orders_most = 2, fewest_periods = 4, octaves_most = 24 };
+
+/// What chance may reach in one place; the log of the number of places comes on top.
+static const double floor_nats = 12.0;
+/// Less than this in power nobody would call a structure.
+static const double least_excess = 1.5;
+
+/// Evidence that m of n squares, of sum `part`, have a larger variance than the others; out_excess: how much larger.
+static double larger_variance(double part, double m, double sum, double n, double *out_excess)
+{
+    double rest = sum - part, others = n - m;
+    *out_excess = rest > 0.0 ? part / m / (rest / others) : INFINITY;
+    if (!(part > 0.0 && rest > 0.0) || *out_excess <= 1.0)
+        return 0.0;
+    return 0.5 * (n * log(sum / n) - m * log(part / m) - others * log(rest / others));
+}
+
+/// Bins from .. to - 1 of the block.
+struct octave {
+    size_t from, to;
+};
+
+/// Octaves of the band; the constant part counts with the first lines. Returns how many.
+static size_t split_octaves(size_t band, struct octave out[octaves_most])
+{
+    size_t count = 0, from = 0;
+    for (size_t to = 4; from <= band && count < octaves_most; to *= 2) {
+        bool last = to > band || count + 1 == octaves_most;
+        out[count] = (struct octave){from, last ? band + 1 : to};
+        from = out[count++].to;
+    }
+    return count;
+}
+
+static void keep(struct structure *s, const struct octave *at, double nats, double excess, double places,
+                 const char *where)
+{
+    if (!(nats > floor_nats + log(places)) || !(excess > least_excess) || (s->found && nats <= s->nats))
+        return;
+    s->found = true;
+    s->nats = nats;
+    s->excess = excess;
+    s->first_bin = at->from;
+    s->last_bin = at->to - 1;
+    snprintf(s->where, sizeof s->where, "%s", where);
+}
+
+/// Orthonormal slow courses over the periods: straight and, with six periods or more, curved.
+static size_t slow_courses(size_t periods, double *out)
+{
+    size_t orders = periods >= 6 ? 2 : 1;
+    for (size_t q = 0; q < orders; q++) {
+        double *course = out + q * periods, norm = 0.0, mean = 0.0;
+        for (size_t p = 0; p < periods; p++) {
+            double u = (2.0 * (double)p - (double)(periods - 1)) / (double)periods;
+            course[p] = q == 0 ? u : u * u;
+            mean += course[p] / (double)periods;
+        }
+        for (size_t p = 0; p < periods; p++) {
+            course[p] -= mean; // even and odd courses are orthogonal by themselves
+            norm += course[p] * course[p];
+        }
+        for (size_t p = 0; p < periods; p++)
+            course[p] /= sqrt(norm);
+    }
+    return orders;
+}
+
+/// Values from .. to - 1 of each period: how much of their squares lies in slow courses.
+static double slow_part(const struct evidence *e, const double *contrasts, const double *courses, size_t orders,
+                        size_t from, size_t to, double *out_sum)
+{
+    size_t P = e->recording->periods, width = e->contrast.width;
+    double slow = 0.0;
+    *out_sum = 0.0;
+    for (size_t i = from; i < to; i++) {
+        for (size_t p = 0; p < P; p++)
+            *out_sum += contrasts[p * width + i] * contrasts[p * width + i];
+        for (size_t q = 0; q < orders; q++) {
+            double along = 0.0;
+            for (size_t p = 0; p < P; p++)
+                along += courses[q * P + p] * contrasts[p * width + i];
+            slow += along * along;
+        }
+    }
+    return slow;
+}
+
+/// A gain, a friction or a bias that creeps.
+static void find_slow_change(const struct evidence *e, const double *contrasts, double *courses, struct structure *out)
+{
+    const struct recording *r = e->recording;
+    struct octave octaves[octaves_most];
+    size_t P = r->periods, orders = slow_courses(P, courses), count = split_octaves(r->band, octaves);
+    double hz = r->rate_hz / (double)r->block.samples;
+    for (size_t i = 0; i < count; i++) {
+        const struct octave *o = &octaves[i];
+        size_t first = o->from == 0 ? 0 : 2 * o->from - 1, last = 2 * o->to - 1;
+        double sum, excess, values = (double)(last - first);
+        double slow = slow_part(e, contrasts, courses, orders, first, last, &sum);
+        double nats = larger_variance(slow, values * (double)orders, sum, values * (double)(P - 1), &excess);
+        char where[160];
+        snprintf(where, sizeof where, "it changes slowly over the run, at %.3g..%.3g Hz %.2g times the noise in power",
+                 (double)o->from * hz, (double)(o->to - 1) * hz, excess);
+        keep(out, o, nats, excess, (double)count, where);
+    }
+}
+
+/// Period before which the constant part changes most: where two means leave the least.
+static size_t change_point(const struct evidence *e, const double *contrasts)
+{
+    size_t P = e->recording->periods, best = 1;
+    double most = 0.0, before = 0.0;
+    for (size_t p = 1; p < P; p++) { // the deviations' sum is zero: what follows is minus what went before
+        before += contrasts[(p - 1) * e->contrast.width];
+        double explained = before * before * (1.0 / (double)p + 1.0 / (double)(P - p));
+        if (explained > most) {
+            most = explained;
+            best = p;
+        }
+    }
+    return best;
+}
+
+/// A bias that jumps or wanders: the constant part differs between periods by more than the lines next to it.
+static void find_level(const struct evidence *e, const double *contrasts, struct structure *out)
+{
+    const struct recording *r = e->recording;
+    const size_t near = 4;
+    size_t P = r->periods, width = e->contrast.width, last = r->band < near ? r->band : near;
+    double level = 0.0, sum = 0.0, excess;
+    for (size_t p = 0; p < P; p++)
+        for (size_t i = 0; i <= 2 * last; i++) {
+            double square = contrasts[p * width + i] * contrasts[p * width + i];
+            sum += square;
+            level += i == 0 ? square : 0.0;
+        }
+    double nats = larger_variance(level, (double)(P - 1), sum, (double)((P - 1) * (2 * last + 1)), &excess);
+    double at_s = r->all.start_s + (double)r->starts[change_point(e, contrasts)] / r->rate_hz;
+    char where[160];
+    snprintf(where, sizeof where,
+             "the constant part differs between periods by %.2g times the noise, most of all from about %.3g s on",
+             sqrt(excess), at_s);
+    keep(out, &(struct octave){0, 1}, nats, excess, 1.0, where);
+}
+
+/// One period's whitened contrasts in time: white, if they are noise. Sums of squares over equal stretches.
+static void stretch_powers(const struct evidence *e, const double *values, const struct octave *o, double *work,
+                           double *out_powers)
+{
+    size_t n = e->recording->block.samples;
+    double *time = work + 2 * n;
+    memset(work, 0, 2 * n * sizeof *work);
+    if (o->from == 0)
+        work[0] = values[0];
+    for (size_t k = o->from > 0 ? o->from : 1; k < o->to; k++) {
+        work[2 * k] = work[2 * (n - k)] = values[2 * k - 1];
+        work[2 * k + 1] = values[2 * k];
+        work[2 * (n - k) + 1] = -values[2 * k];
+    }
+    fft_inverse(e->plan, work, time);
+    memset(out_powers, 0, cells * sizeof *out_powers);
+    for (size_t i = 0; i < n; i++)
+        out_powers[i * cells / n] += time[2 * i] * time[2 * i] / (2.0 * (double)n);
+}
+
+/// Stretches that are louder in one period than in the others: compared at the same place of the period, because noise
+/// may well depend on the motion. One that is beyond chance by itself counts, and so do several that are nearly so.
+static void find_burst_in(const struct evidence *e, const struct octave *o, const double *powers, double octaves,
+                          struct structure *out)
+{
+    const struct recording *r = e->recording;
+    size_t P = r->periods, n = r->block.samples, loud = 0, loudest = 0;
+    double values = 2.0 * (double)(o->to - o->from) / cells * (1.0 - 1.0 / (double)P);
+    double hz = r->rate_hz / (double)n, most_nats = 0.0, most_excess = 0.0, together = 0.0;
+    const double common_nats = 3.0, floor_together = 4.0; // of the 3 nats one stretch in 140 has by chance
+    for (size_t i = 0; i < P * cells; i++) {
+        double sum = 0.0, excess;
+        for (size_t p = 0; p < P; p++)
+            sum += powers[p * cells + i % cells];
+        double nats = larger_variance(powers[i], values, sum, values * (double)P, &excess);
+        if (nats > common_nats) {
+            together += nats - common_nats;
+            loud++;
+        }
+        if (nats > most_nats) {
+            most_nats = nats;
+            most_excess = excess;
+            loudest = i;
+        }
+    }
+    double start_s = r->all.start_s + (double)(r->starts[loudest / cells] + loudest % cells * n / cells) / r->rate_hz;
+    char where[160], others[48] = "";
+    if (loud > 1)
+        snprintf(others, sizeof others, ", and %zu more stretches", loud - 1);
+    snprintf(where, sizeof where,
+             "%.4g to %.4g s after the start, %.3g..%.3g Hz are %.2g times as strong as in other periods%s", start_s,
+             start_s + (double)n / cells / r->rate_hz, (double)o->from * hz, (double)(o->to - 1) * hz,
+             sqrt(most_excess), others);
+    keep(out, o, most_nats, most_excess, octaves * (double)(P * cells), where);
+    if (together > floor_nats + floor_together + log(octaves))
+        keep(out, o, together, most_excess, octaves, where);
+}
+
+static void find_burst(const struct evidence *e, const double *contrasts, double *work, struct structure *out)
+{
+    const size_t fewest_bins = cells; // two values per stretch
+    struct octave octaves[octaves_most];
+    size_t P = e->recording->periods, count = split_octaves(e->recording->band, octaves);
+    double *powers = work + 4 * e->recording->block.samples;
+    for (size_t i = 0; i < count; i++) {
+        if (octaves[i].to - octaves[i].from < fewest_bins)
+            continue;
+        for (size_t p = 0; p < P; p++)
+            stretch_powers(e, contrasts + p * e->contrast.width, &octaves[i], work, powers + p * cells);
+        find_burst_in(e, &octaves[i], powers, (double)count, out);
+    }
+}
+
+static void find_line(const struct evidence *e, struct structure *out)
+{
+    if (e->tone_count == 0)
+        return;
+    char where[160];
+    snprintf(where, sizeof where, "a line at %.5g Hz stands out that was not excited", e->tones_hz[0]);
+    // What made it a tone was its evidence already.
+    const struct recording *r = e->recording;
+    size_t bin = (size_t)(e->tones_hz[0] * (double)r->block.samples / r->rate_hz);
+    // What changes slowly or for a moment has lines as well, but says less by them.
+    if (out->found && bin + 1 >= out->first_bin && bin <= out->last_bin + 1)
+        return;
+    keep(out, &(struct octave){bin, bin + 2}, e->tone_nats, INFINITY, 1.0, where);
+}
+
+bool structure_find(const struct evidence *evidence, const double *contrasts, struct structure *out_structure)
+{
+    const struct recording *r = evidence->recording;
+    size_t n = r->block.samples, P = r->periods;
+    memset(out_structure, 0, sizeof *out_structure);
+    if (!r->periodic || P < fewest_periods)
+        return true;
+    double *work = malloc((4 * n + P * (cells + orders_most)) * sizeof *work);
+    if (!work)
+        return false;
+    find_slow_change(evidence, contrasts, work + 4 * n + P * cells, out_structure);
+    find_level(evidence, contrasts, out_structure);
+    find_burst(evidence, contrasts, work, out_structure);
+    find_line(evidence, out_structure);
+    free(work);
+    return true;
+}
+
+void structure_find_slow(const struct evidence *evidence, const double *whitened, struct structure *out_structure)
+{
+    const struct recording *r = evidence->recording;
+    const size_t slow = 4, near = 32; // bins of the run
+    const double enough = 8.0;        // in power: friction's harmonics lie close
+    memset(out_structure, 0, sizeof *out_structure);
+    if (r->periodic || r->band < near)
+        return;
+    double part = 0.0, sum = 0.0, excess;
+    size_t values = 0, slow_values = 0;
+    for (size_t i = 1; i < evidence->values; i++) {
+        size_t channel, bin = evidence_bin(evidence, i, &channel);
+        if (channel != 0 || bin > near)
+            continue;
+        sum += whitened[i] * whitened[i];
+        part += bin <= slow ? whitened[i] * whitened[i] : 0.0;
+        values++;
+        slow_values += bin <= slow;
+    }
+    double nats = larger_variance(part, (double)slow_values, sum, (double)values, &excess);
+    double hz = r->rate_hz / (double)r->block.samples;
+    char where[160];
+    snprintf(where, sizeof where, "it changes slowly over the run, below %.2g Hz %.2g times the noise in power",
+             (double)slow * hz, excess);
+    if (excess > enough)
+        keep(out_structure, &(struct octave){0, slow + 1}, nats, excess, 1.0, where);
+}

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT */
+/// Structure over time in what a model leaves of a run with periods: what is noise does not care which period it is in.
+#ifndef SERVOSCOPE_DIAGNOSE_STRUCTURE_H
+#define SERVOSCOPE_DIAGNOSE_STRUCTURE_H
+
+#include "lab/diagnose/noise.h"
+
+/// Something beyond chance. Nats are log-likelihood ratios against equal variance.
+struct structure {
+    bool found;
+    double nats;
+    double excess;              ///< its power over that of the rest
+    size_t first_bin, last_bin; ///< of the block, where it is
+    char where[160];            ///< empty if nothing was found
+};
+
+/// Looks, in the contrasts that a model leaves, for a change from period to period that is slower than the rest (per
+/// octave of frequency), for a constant part that differs between periods by more than the lines next to it, for a
+/// stretch of one period that is louder than the same stretch of the others (likewise), and
+/// for lines.
+/// Equation:  nats = (n ln(S / n) - m ln(A / m) - (n - m) ln((S - A) / (n - m))) / 2,  A the sum of m of the n squares
+///            whose sum is S, where A / m is the larger
+/// Range:     four periods or more; nothing is found in fewer
+/// Shapes:    contrasts: evidence->contrast.values
+/// Errors:    false if memory is short
+bool structure_find(const struct evidence *evidence, const double *contrasts, struct structure *out_structure);
+
+/// The same for a run without periods, in what model and black box together leave of it (whitened): a change slower
+/// than a fourth of the run, which no function of the motion explains.
+/// Shapes:    whitened: evidence->values
+void structure_find_slow(const struct evidence *evidence, const double *whitened, struct structure *out_structure);
+
+#endif
