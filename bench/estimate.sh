@@ -3,6 +3,7 @@
 # Speed of method mean and method lpm beside numpy on the same data, and whether both say the same.
 # Mean: numpy's rfft over periods, means and covariances. LPM: one least squares (numpy.linalg.lstsq) per line, as textbooks
 # write it; and, for the record, one matrix product for all lines at once. From rows in memory to the response, processor time.
+# Last the parametric fit beside scipy's.
 # usage: ./run bench estimate   (numpy comes into a virtual environment of its own, in the build folder)
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -23,3 +24,5 @@ for round in 1 2 3; do
     "$SERVOSCOPE_BUILD/bench/estimate_speed" "$folder" >"$folder/times-$round"
     "$venv/bin/python" bench/estimate_numpy.py "$folder" "$round"
 done
+# The parametric fit beside scipy's least_squares.
+bench/quasilog.sh --speed

@@ -3,6 +3,7 @@
 # The fourth paper's study (lines spaced by a ratio make every resonance as sure as any other): paper, here, required. Then how
 # long a parametric fit takes beside scipy's least_squares on the same data.
 # usage: ./run bench quasilog [RUNS [SEED]]   (draws a system, 1000 and seed 1)
+#        ./run bench quasilog --speed         (only how long a fit takes; ./run bench estimate has it too)
 set -euo pipefail
 cd "$(dirname "$0")/.."
 cmake --build "$SERVOSCOPE_BUILD" --target quasilog -- --quiet >&2
@@ -10,7 +11,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
 status=0
-"$SERVOSCOPE_BUILD/bench/quasilog" "$@" || status=$?
+[ "${1:-}" = --speed ] || "$SERVOSCOPE_BUILD/bench/quasilog" "$@" || status=$?
 
 venv=$SERVOSCOPE_BUILD/venv-scipy
 if ! "$venv/bin/python" -c 'import numpy, scipy' 2>/dev/null; then

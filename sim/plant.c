@@ -402,6 +402,9 @@ static void step_finely(struct state *io, const struct sim_stepper *stepper, dou
         if (!bent && steps == 1 && slide(io, stepper, torque, dry, stepper->dt_s))
             return;
         size_t swings = sim_stepper_inner_steps(bristle_rate(io, stepper, dry), stepper->dt_s);
+        // Looking ahead, friction that builds up within a fraction of a step is as good as friction that switches.
+        const size_t quick_most = 8;
+        swings = stepper->quick && swings > quick_most ? quick_most : swings;
         steps = swings > steps ? swings : steps;
     }
     double dt_s = stepper->dt_s / (double)steps;

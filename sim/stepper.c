@@ -113,6 +113,7 @@ static void init(struct sim_stepper *self, const struct sim_model *model, double
 {
     sim_stepper_init_once(self, model, dt_s);
     prepare_actuator(self);
+    self->quick = quick;
     self->exact = self->oppose.count == 0 && self->bend.count == 0 && !(self->build_up > 0.0);
     self->split = self->exact || (quick && self->bend.count == 0 && !(self->build_up > 0.0));
     if (!self->split)

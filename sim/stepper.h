@@ -49,6 +49,7 @@ struct sim_stepper {
     struct sim_opposing steady; ///< the model's friction and the effects that are the same at every instant
     struct sim_hooked oppose;   ///< the others
     struct sim_hooked bend, limit, sense, lose;
+    bool quick;                           ///< for looks ahead from measured states: sim_stepper_init_quick
     bool split;                           ///< `transitions` move the linear parts, the rest acts as it is half way
     bool exact;                           ///< and there is no rest but constant dry friction
     bool one_way;                         ///< and friction does not ask for the direction of motion

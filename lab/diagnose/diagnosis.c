@@ -2,6 +2,7 @@
 #include "lab/diagnose/diagnosis.h"
 
 #include "lab/diagnose/blackbox.h"
+#include "lab/diagnose/gain.h"
 #include "lab/diagnose/judge.h"
 #include "lab/diagnose/recording.h"
 #include "lab/diagnose/search.h"
@@ -75,12 +76,28 @@ static int check_alike(const struct run *run, const struct recording *r, const s
                        const struct recording *first, struct error *out_error)
 {
     bool reference = r->block.torque_ref != NULL, first_reference = first->block.torque_ref != NULL;
+    if ((r->input_unit == NULL) != (first->input_unit == NULL) ||
+        (r->input_unit && strcmp(r->input_unit, first->input_unit) != 0))
+        return error_set(out_error, error_refused, "%s: the input is in %s; %s: in %s: all runs have to be alike",
+                         run->path, r->input_unit ? r->input_unit : "Nm or N", first_run->path,
+                         first->input_unit ? first->input_unit : "Nm or N");
     if (r->rate_hz == first->rate_hz && r->linear == first->linear && reference == first_reference)
         return 0;
     return error_set(out_error, error_refused,
                      "%s: %g Hz, %s, %s torque reference; %s: %g Hz, %s, %s: all runs have to be alike", run->path,
                      r->rate_hz, r->linear ? "linear" : "rotary", reference ? "with" : "without", first_run->path,
                      first->rate_hz, first->linear ? "linear" : "rotary", first_reference ? "with" : "without");
+}
+
+/// Gives a run the first one's rate if clocks and time stamps may differ by as much; true if that is worth saying.
+static bool share_rate(const struct run *first, struct run *io_run)
+{
+    const double near = 1e-3, rounding = 1e-6;
+    double off = fabs(io_run->sample_rate_hz / first->sample_rate_hz - 1.0);
+    if (!(off <= near))
+        return false;
+    io_run->sample_rate_hz = first->sample_rate_hz;
+    return off > rounding;
 }
 
 /// Recording number i: fit runs, then validation runs, of which the only one may be the end of the first fit run.
@@ -90,9 +107,14 @@ static int prepare_one(const struct diagnosis_request *request, struct work *w, 
     const struct run *run = i < w->fit_count ? &request->fit[i] : &request->validate[i - w->fit_count];
     if (held_back && (i == 0 || i == w->fit_count))
         run = &w->parts[i == 0 ? 0 : 1];
-    int status = recording_prepare(run, &w->recordings[i], out_error);
+    struct run alike = *run;
+    bool one_rate = share_rate(&request->fit[0], &alike);
+    int status = recording_prepare(&alike, &w->recordings[i], out_error);
     if (status != 0)
         return status;
+    if (one_rate)
+        oddities_add(&w->recordings[i].oddities, "%s: sampled at %.8g Hz, the first run at %.8g Hz: taken as the same.",
+                     run->path, run->sample_rate_hz, alike.sample_rate_hz);
     if (held_back && i == w->fit_count)
         recording_begin(&w->recordings[i], (double)w->held_from / run->sample_rate_hz);
     return check_alike(run, &w->recordings[i], &request->fit[0], &w->recordings[0], out_error);
@@ -117,17 +139,63 @@ static int prepare_recordings(const struct diagnosis_request *request, struct wo
     return 0;
 }
 
-/// Inertia of a rigid body by least squares of torque on acceleration: a start for the fit.
-static double guess_inertia(const struct recording *r)
+/// Torque against acceleration: Newton's law over stretches of a quarter of the excitation's middle period, in which
+/// the noise of a speed matters less than from sample to sample.
+struct inertia_guess {
+    double inertia;     ///< of a rigid body by least squares; negative: positive torque accelerates backward
+    double correlation; ///< -1..1
+    double negligible;  ///< an inertia that takes a hundredth of the torque for the accelerations there are
+};
+
+static struct inertia_guess guess_inertia(const struct recording *r)
 {
     const struct stretch *b = &r->block;
-    double tt = 0.0, aa = 0.0;
-    for (size_t n = 1; n + 1 < b->samples; n++) {
-        double a = 0.5 * r->rate_hz * (b->velocity[n + 1] - b->velocity[n - 1]);
-        tt += a * b->torque[n];
+    const double little = 0.01;
+    size_t reach = b->samples / (8 * r->bins[r->bin_count / 2]);
+    reach = reach < 1 ? 1 : reach;
+    double ta = 0.0, aa = 0.0, tt = 0.0, mean = 0.0, sum = 0.0;
+    for (size_t n = 0; n < b->samples; n++)
+        mean += b->torque[n] / (double)b->samples;
+    for (size_t n = 0; n < b->samples; n++) {
+        sum += b->torque[n] - mean;
+        if (n < 2 * reach)
+            continue;
+        double change = b->velocity[n] - b->velocity[n - 2 * reach], a = change * r->rate_hz / (2.0 * (double)reach);
+        double t = (sum - 0.5 * (b->torque[n] + b->torque[n - 2 * reach]) + mean) / (2.0 * (double)reach);
+        ta += a * t;
         aa += a * a;
+        tt += t * t;
+        sum -= b->torque[n - 2 * reach] - mean;
     }
-    return aa > 0.0 && tt > 0.0 ? tt / aa : r->coverage.torque_rms / fmax(r->coverage.velocity_rms * r->rate_hz, 1e-12);
+    // Where nothing accelerates at all, as in a table of places, a speed that were lost in a sample stands in for it.
+    double still = 1e-6 * r->coverage.velocity_rms * r->rate_hz, any = sqrt(aa * tt);
+    double acceleration = fmax(sqrt(aa / (double)b->samples), fmax(still, 1e-12));
+    return (struct inertia_guess){.inertia = aa > 0.0 ? ta / aa : 0.0,
+                                  .correlation = any > 0.0 ? ta / any : 0.0,
+                                  .negligible = little * r->coverage.torque_rms / acceleration};
+}
+
+/// Whether the torque and the acceleration have anything in common. Where a controller holds a constant speed, or the
+/// axis was held at one place after the other, the motion says nothing of the inertia, and a free one would explain it by
+/// having none of the torque act.
+static bool accelerates(const struct inertia_guess *guess)
+{
+    const double least = 0.1;
+    return fabs(guess->correlation) > least;
+}
+
+/// The inertia at which a fit of a free one begins, or one too small to matter, which stays.
+static double start_inertia(const struct recording *first, struct diagnosis *d)
+{
+    struct inertia_guess guess = guess_inertia(first);
+    d->inertia_seen = accelerates(&guess);
+    if (d->inertia_seen)
+        return fabs(guess.inertia);
+    oddities_add(&d->oddities,
+                 "The %s does not accelerate the axis (correlation %.2g with the acceleration): no %s can be found. It "
+                 "is taken as so small that it does not matter.",
+                 d->linear ? "force" : "torque", guess.correlation, d->linear ? "mass" : "inertia");
+    return guess.negligible;
 }
 
 static int choose_model(const struct diagnosis_request *request, const struct recording *first, struct diagnosis *d,
@@ -145,11 +213,47 @@ static int choose_model(const struct diagnosis_request *request, const struct re
     } else {
         sim_model_default(&d->given);
         d->given.linear = first->linear;
-        d->given.motor_inertia_kgm2 = guess_inertia(first);
+        d->given.motor_inertia_kgm2 = start_inertia(first, d);
         d->given.sensors = (struct sim_sensors){0};
     }
     d->given.sample_rate_hz = first->rate_hz;
     return 0;
+}
+
+static void scale_input(struct work *w, struct diagnosis *d, double factor)
+{
+    for (size_t i = 0; i < w->fit_count + w->validate_count; i++)
+        gain_scale(&w->recordings[i], factor);
+    d->input_gain *= factor;
+}
+
+/// A current or a voltage may count the other way round than the motion; a torque may not.
+static void choose_sign(struct work *w, struct diagnosis *d, const struct inertia_guess *guess)
+{
+    if (!accelerates(guess) || guess->inertia > 0.0)
+        return;
+    scale_input(w, d, -1.0);
+    oddities_add(&d->oddities, "Positive %s accelerates backward (correlation %.2g): its sign was turned.",
+                 strcmp(d->input_unit, "V") == 0 ? "voltage" : "current", guess->correlation);
+}
+
+/// A current or a voltage becomes a torque by what the model's inertia takes; without a model it stays what it is.
+static void choose_gain(struct work *w, struct diagnosis *d)
+{
+    d->input_unit = w->recordings[0].input_unit;
+    d->input_gain = 1.0;
+    if (!d->input_unit)
+        return;
+    struct inertia_guess guess = guess_inertia(&w->recordings[0]);
+    choose_sign(w, d, &guess);
+    if (d->model_given && accelerates(&guess))
+        scale_input(w, d, (d->given.motor_inertia_kgm2 + d->given.load_inertia_kgm2) / fabs(guess.inertia));
+    else if (!d->model_given)
+        oddities_add(&d->oddities,
+                     "The input is in %s, and no model says what %s that makes: %ss, frictions and %s are in units of "
+                     "what 1 %s makes.",
+                     d->input_unit, d->linear ? "force" : "torque", d->linear ? "force" : "torque",
+                     d->linear ? "masses" : "inertias", d->input_unit);
 }
 
 /// What is odd about the recordings, and whether they can be of the drive that the model is of.
@@ -161,7 +265,7 @@ static int look_at_oddities(const struct diagnosis_request *request, const struc
         for (size_t j = 0; j < odd->count; j++)
             oddities_add(&d->oddities, "%s", odd->texts[j]);
     }
-    double inertia = d->model_given ? d->given.motor_inertia_kgm2 + d->given.load_inertia_kgm2 : 0.0;
+    double inertia = d->model_given && !d->input_unit ? d->given.motor_inertia_kgm2 + d->given.load_inertia_kgm2 : 0.0;
     return oddities_of_inertia(&request->fit[0], &w->recordings[0], inertia, &d->oddities, out_error);
 }
 
@@ -256,9 +360,45 @@ static bool estimate_validation_noise(struct work *w, const struct hypothesis *h
     return good;
 }
 
+/// Moves a free gain to where the fit wants it; the fit does not belong to the recordings any more then.
+static bool refine_gain(struct work *w, struct diagnosis *d, const struct hypothesis *h, double *out_step)
+{
+    const double most = 0.7; // twofold
+    double step, deviation;
+    *out_step = 0.0;
+    if (!h->gain_free)
+        return true;
+    if (!gain_step(&w->fit_data, &w->fit, h, w->recordings, &step, &deviation))
+        return false;
+    *out_step = fmin(fmax(step, -most), most);
+    scale_input(w, d, exp(*out_step));
+    d->input_gain_deviation = d->input_gain * deviation;
+    return true;
+}
+
 static bool same_names(const struct hypothesis *a, const struct hypothesis *b)
 {
     return memcmp(a->named, b->named, sizeof a->named) == 0;
+}
+
+/// Refits the given structure, and with it a free gain.
+static bool refit_given(struct work *w, struct diagnosis *d, struct hypothesis *h, struct sim_model *out_model)
+{
+    const double settled = 1e-4;
+    size_t passes = h->gain_free ? 8 : 2;
+    bool more = true;
+    *out_model = d->given;
+    for (size_t pass = 0; pass < passes && more; pass++) {
+        double step = 0.0;
+        if (!estimate_fit_noise(w, out_model) ||
+            !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
+            !fit_run(&w->fit, &w->fit_data, h, refit_iterations) ||
+            (pass + 1 < passes && !refine_gain(w, d, h, &step)))
+            return false;
+        hypothesis_model(h, NULL, out_model);
+        more = !h->gain_free || fabs(step) > settled;
+    }
+    return true;
 }
 
 /// Refits the given structure, then searches; the noise is estimated anew under every better model, because a wrong
@@ -266,20 +406,18 @@ static bool same_names(const struct hypothesis *a, const struct hypothesis *b)
 static bool find_causes(const struct diagnosis_request *request, struct work *w, struct diagnosis *d,
                         struct hypothesis *h)
 {
-    struct sim_model model = d->given;
-    hypothesis_init(h, &d->given, !d->model_given, w->recordings[0].block.torque_ref != NULL);
+    struct sim_model model;
+    double step;
+    hypothesis_init(h, &d->given, !d->model_given && d->inertia_seen, w->recordings[0].block.torque_ref != NULL);
     h->sensors_seen = w->evidence[0].kinematics.values > 0;
-    for (int pass = 0; pass < 2; pass++) {
-        if (!estimate_fit_noise(w, &model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
-            !fit_run(&w->fit, &w->fit_data, h, refit_iterations))
-            return false;
-        hypothesis_model(h, NULL, &model);
-    }
+    h->gain_free = d->input_unit && d->model_given;
+    if (!refit_given(w, d, h, &model))
+        return false;
     d->refitted_model = model;
     struct search_options options = {.causes_max = 6, .progress = request->progress, .user = request->user};
     for (int pass = 0; pass < 4; pass++) {
         struct hypothesis before = *h;
-        if (!estimate_fit_noise(w, &model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
+        if ((pass > 0 && !refine_gain(w, d, h, &step)) || !estimate_fit_noise(w, &model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
             !search_run(&w->fit_data, &w->recordings[0].coverage, &options, h, &w->fit))
             return false;
         hypothesis_model(h, NULL, &model);
@@ -403,6 +541,36 @@ static void name_runs(const struct diagnosis_request *request, struct diagnosis 
                                  request->fit[i].path ? request->fit[i].path : "run");
 }
 
+static void add_gain_tie(struct diagnosis *d, size_t model_offset, const char *next)
+{
+    for (int e = 0; sim_effects[e] && d->tie_count < diagnosis_ties_max; e++) {
+        if (sim_effects[e]->parameters[0].model_offset != model_offset || sim_effects[e]->parameter_count != 1)
+            continue;
+        struct diagnosis_tie *tie = &d->ties[d->tie_count++];
+        tie->effects[0] = e;
+        tie->effects[1] = diagnosis_gain;
+        snprintf(tie->next, sizeof tie->next, "%s", next);
+    }
+}
+
+/// What a free gain takes the place of.
+static void list_gain_ties(struct diagnosis *d)
+{
+    if (!d->input_unit)
+        return;
+    add_gain_tie(d, offsetof(struct sim_model, load_inertia_kgm2),
+                 "weigh the load, or measure the torque that a known current makes, and give it with --map");
+    if (strcmp(d->input_unit, "V") == 0)
+        add_gain_tie(d, offsetof(struct sim_model, viscous_friction_Nms_per_rad),
+                     "record the current as well: what the motor's own voltage takes at speed looks like viscous "
+                     "friction");
+    if (d->model_given)
+        oddities_add(&d->oddities,
+                     "The input is in %s; 1 %s makes %.4g +- %.2g %s, if the model's inertia is right. All torques and "
+                     "frictions are wrong by as much as that is.",
+                     d->input_unit, d->input_unit, d->input_gain, d->input_gain_deviation, d->linear ? "N" : "Nm");
+}
+
 static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesis *h)
 {
     // The noise of the validation data under the extended model; one set of weights for all three models.
@@ -436,6 +604,7 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     if (h->inertia_free || !judgement.unexplained) {
         d->tie_count = judge_ties(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, d->ties, diagnosis_ties_max);
     }
+    list_gain_ties(d);
     return validate_curves(&w->validate_data, d, &d->curves);
 }
 
@@ -449,6 +618,8 @@ int diagnosis_run(const struct diagnosis_request *request, struct diagnosis *out
     int status = prepare_recordings(request, &w, d, out_error);
     if (status == 0)
         status = choose_model(request, &w.recordings[0], d, out_error);
+    if (status == 0)
+        choose_gain(&w, d);
     if (status == 0)
         status = look_at_oddities(request, &w, d, out_error);
     if (status == 0)

@@ -17,7 +17,7 @@
 
 enum diagnosis_verdict { diagnosis_explained, diagnosis_unexplained, diagnosis_no_discrepancy };
 
-enum { diagnosis_causes_max = 8, diagnosis_ties_max = 8 };
+enum { diagnosis_causes_max = 8, diagnosis_ties_max = 8, diagnosis_gain = -1 };
 
 /// An effect found, with estimates.
 struct diagnosis_cause {
@@ -30,8 +30,8 @@ struct diagnosis_cause {
 };
 
 struct diagnosis_tie {
-    int effects[2];
-    char next[200]; ///< the measurement that would separate them
+    int effects[2]; ///< the second may be diagnosis_gain: the free gain of a current or a voltage
+    char next[320]; ///< the command that finds the measurement which separates them, and what that may be
 };
 
 struct diagnosis_untestable {
@@ -63,8 +63,12 @@ struct diagnosis_curves {
 
 struct diagnosis {
     enum diagnosis_verdict verdict;
+    bool inertia_seen; ///< without a model: the recordings say what the inertia is
     bool linear, model_given, held_back; ///< held_back: validated on the last part of the only run
     char runs[512], motion_from[280];    ///< what was fitted; one sentence on the filtering
+    const char *input_unit;              ///< "A", "V", or NULL: a torque or a force
+    double input_gain;                   ///< torque or force per unit of the input
+    double input_gain_deviation;         ///< its standard deviation, 0 where it was not estimated
     struct oddities oddities;            ///< about the recordings, before any model
     struct sim_model given, refitted_model, extended_model;
     struct model_deviations deviations; ///< of extended_model

@@ -62,7 +62,8 @@ static bool add_ties(cJSON *root, const struct diagnosis *self)
     bool ok = array != NULL;
     for (size_t i = 0; ok && i < self->tie_count; i++) {
         const struct diagnosis_tie *tie = &self->ties[i];
-        const char *ids[] = {sim_effects[tie->effects[0]]->id, sim_effects[tie->effects[1]]->id};
+        const char *ids[] = {sim_effects[tie->effects[0]]->id,
+                             tie->effects[1] == diagnosis_gain ? "gain" : sim_effects[tie->effects[1]]->id};
         cJSON *object = append_object(array);
         cJSON *names = object ? cJSON_CreateStringArray(ids, 2) : NULL;
         ok = names && cJSON_AddItemToObject(object, "causes", names) && add_text(object, "next", tie->next);
@@ -109,6 +110,16 @@ static bool add_notes(cJSON *root, const struct diagnosis *self)
     return ok;
 }
 
+static bool add_gain(cJSON *root, const struct diagnosis *self)
+{
+    if (!self->input_unit) {
+        return true;
+    }
+    cJSON *object = cJSON_AddObjectToObject(root, "input_gain");
+    return object && add_text(object, "input_unit", self->input_unit) && add_number(object, "value", self->input_gain) &&
+           add_number(object, "std", self->input_gain_deviation);
+}
+
 /// What a reader of the file alone would miss: the verdict as a sentence, and what it rests on.
 static bool add_context(cJSON *root, const struct diagnosis *self)
 {
@@ -120,7 +131,7 @@ static bool add_context(cJSON *root, const struct diagnosis *self)
            cJSON_AddBoolToObject(root, "linear", self->linear) &&
            cJSON_AddBoolToObject(root, "model_given", self->model_given) &&
            cJSON_AddBoolToObject(root, "held_back", self->held_back) &&
-           add_number(root, "fit_misfit", self->fit_misfit);
+           add_number(root, "fit_misfit", self->fit_misfit) && add_gain(root, self);
 }
 
 cJSON *diagnosis_json(const struct diagnosis *self)

@@ -147,8 +147,9 @@ bool hypothesis_may_name(const struct hypothesis *self, int effect)
         return false;
     if (e->place == sim_place_actuator && !self->actuator_seen)
         return false;
-    bool free_inertia =
-        e->parameters[0].model_offset == offsetof(struct sim_model, load_inertia_kgm2) && self->inertia_free;
+    bool gain_is_inertia = self->gain_free && self->engaged.structure == sim_structure_rigid;
+    bool free_inertia = e->parameters[0].model_offset == offsetof(struct sim_model, load_inertia_kgm2) &&
+                        (self->inertia_free || gain_is_inertia);
     return !free_inertia && has_place_for(self, effect);
 }
 

@@ -34,6 +34,7 @@ struct coordinate {
 struct hypothesis {
     const struct sim_model *given;
     bool inertia_free;  ///< no model was given: the rigid body's inertia has no prior and no box
+    bool gain_free;     ///< the input is no torque: its gain takes the place of a rigid body's inertia
     bool actuator_seen; ///< the recordings have a torque reference: what lies between it and the torque can show
     bool sensors_seen;  ///< position and speed were recorded by columns of their own: what one says of the other counts
     bool named[sim_effects_max];

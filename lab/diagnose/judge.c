@@ -5,6 +5,7 @@
 #include "lab/diagnose/predict.h"
 #include "lab/diagnose/search.h"
 #include "lab/diagnose/structure.h"
+#include "sim/stepper.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -52,27 +53,29 @@ static double noise_share(const struct fit_data *data, const struct sim_coverage
     return sqrt(power) / coverage->torque_rms;
 }
 
-/// Share of the speed's RMS by which the sensors' columns differ for an effect.
+/// By how much the sensors are wrong for an effect, RMS, as a share of the travelled range: small torques may follow
+/// from it, or none at all.
 static double sensor_share(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *h,
                            int effect)
 {
     const struct recording *r = data->evidence[0].recording;
-    size_t n = r->block.samples;
-    if (!sim_effects[effect]->sense || data->evidence[0].kinematics.values == 0)
+    if (!sim_effects[effect]->sense)
         return 0.0;
-    double *left = malloc(n * sizeof *left);
     struct sim_model model;
+    struct sim_stepper stepper;
     hypothesis_model(h, NULL, &model);
     for (int e = 0; sim_effects[e]; e++)
         model.effect_on[e] = model.effect_on[e] && e == effect;
+    sim_stepper_init_once(&stepper, &model, 1.0 / r->rate_hz);
     double sum = 0.0;
-    if (left) {
-        predict_kinematics(&model, &r->block, left);
-        for (size_t i = 0; i < n; i++)
-            sum += (left[i] - r->block.kinematics[i]) * (left[i] - r->block.kinematics[i]);
+    for (size_t n = 0; n < r->block.samples; n++) {
+        struct sim_motion at = {
+            .position = r->block.position[n], .velocity = r->block.velocity[n], .linear = r->linear};
+        struct sim_sensed said;
+        sim_stepper_sense(&stepper, &at, &said);
+        sum += (said.position - at.position) * (said.position - at.position);
     }
-    free(left);
-    return sqrt(sum / (double)n) / coverage->velocity_rms;
+    return sqrt(sum / (double)r->block.samples) / coverage->position_span;
 }
 
 /// Evidence for an effect when the black box may explain everything it can.
@@ -108,7 +111,7 @@ static double evidence_outside(const struct fit_data *data, const struct hypothe
         for (size_t run = 0; run < data->runs; run++)
             for (size_t i = 0; i < data->evidence[run].values; i++, at++) {
                 size_t channel, bin = evidence_bin(&data->evidence[run], i, &channel);
-                if (bin < structure->first_bin || bin > structure->last_bin)
+                if (!structure_holds(structure, bin))
                     gain += 0.5 * (trial.residual[at] * trial.residual[at] - fit->residual[at] * fit->residual[at]);
             }
     }
@@ -148,12 +151,12 @@ static void describe_rest(const struct blackbox *box, const struct fit_data *dat
              blackbox_group_name((enum blackbox_group)best), 100.0 * fmin(2.0 * gains[best] / fmax(total, 1e-9), 1.0));
 }
 
-/// Structure over time in what the hypothesis leaves of the contrasts; the strongest over all runs. `left`: what a black
-/// box leaves of the residual.
+/// Structure over time in what the hypothesis leaves of the contrasts (`fit` NULL: in what is there of them without
+/// effects in time), over all runs. `left`: what a black box leaves of the residual.
 static bool look_over_time(const struct fit_data *data, const struct fit *fit, const double *left,
                            struct structure *out)
 {
-    const double *contrasts = fit->rows > data->values ? fit->residual + data->values : NULL;
+    const double *contrasts = fit && fit->rows > data->values ? fit->residual + data->values : NULL;
     memset(out, 0, sizeof *out);
     for (size_t i = 0; i < data->runs; i++) {
         const struct evidence *e = &data->evidence[i];
@@ -163,45 +166,92 @@ static bool look_over_time(const struct fit_data *data, const struct fit *fit, c
         if (!e->recording->periodic)
             structure_find_slow(e, left, &s);
         left += e->values;
-        if (s.found && (!out->found || s.nats > out->nats))
-            *out = s;
+        structure_merge(out, &s);
         if (contrasts)
             contrasts += e->contrast.values;
     }
     return true;
 }
 
-static void judge_names(const struct blackbox *box, const struct fit_data *data, const struct sim_coverage *coverage,
-                        const struct hypothesis *h, const struct fit *fit, const struct structure *over_time,
-                        struct judgement *j)
+/// What judging names needs.
+struct bench {
+    const struct blackbox *box;
+    const struct fit_data *data;
+    const struct sim_coverage *coverage;
+    const struct hypothesis *hypothesis;
+    const struct fit *fit;
+};
+
+static bool is_large_enough(const struct bench *b, int effect)
 {
     // Of the torque's RMS: less is not worth a name even if it is significant; unless the noise is smaller still.
-    const double least_share = fmin(0.0015, fmax(0.0003, 0.5 * noise_share(data, coverage)));
-    const double least_sensor_share = 2e-5; // of the speed's: a position is known that well
+    const double least_share = fmin(0.0015, fmax(0.0003, 0.5 * noise_share(b->data, b->coverage)));
+    const double least_sensor_share = 1e-6; // of the travelled range: positions are known that well
+    return effect_share(b->data, b->coverage, b->hypothesis, effect) >= least_share ||
+           sensor_share(b->data, b->coverage, b->hypothesis, effect) >= least_sensor_share;
+}
+
+static bool is_in_time(const struct bench *b, int effect)
+{
+    return sim_effects[effect]->in_time && b->data->contrasts > 0;
+}
+
+/// Effects in time answer for what stays over time. Returns whether all stand that were named.
+static bool judge_in_time(const struct bench *b, struct judgement *j)
+{
+    const double dominance = 20.0;
+    bool all = true;
+    for (int e = 0; sim_effects[e]; e++) {
+        if (!b->hypothesis->named[e] || !is_in_time(b, e))
+            continue;
+        j->stands[e] =
+            is_large_enough(b, e) && (!(j->leftover_in_time > 0.0) || search_evidence(b->data, b->hypothesis, b->fit, e) >
+                                                                          dominance * j->leftover_in_time);
+        all = all && j->stands[e];
+    }
+    return all;
+}
+
+/// The others answer for what stays of the mean of the periods.
+static void judge_others(const struct bench *b, const struct structure *over_time, struct judgement *j)
+{
     // How far a cause has to outweigh what stays unexplained. Beside a given model a name says what changed, and a term
     // of the wrong shape gains a hundred times what it leaves. Without a model it says what is there at all.
-    const double dominance = h->inertia_free ? 5.0 : 1000.0;
-    // Effects in time answer for what stays over time, the others for what stays of the mean of the periods.
-    const double dominance_in_time = 20.0;
+    const double dominance = b->hypothesis->inertia_free ? 5.0 : 1000.0;
+    // And a name that takes away less than this of all that the others leave is a piece of something else.
+    const double part_of_rest = 0.3, rest = fmax(0.5 * (b->fit->cost - (double)b->data->values), 0.0);
     for (int e = 0; sim_effects[e]; e++) {
-        if (!h->named[e])
+        if (!b->hypothesis->named[e] || is_in_time(b, e))
             continue;
-        bool in_time = sim_effects[e]->in_time && data->contrasts > 0;
-        bool stands = effect_share(data, coverage, h, e) >= least_share ||
-                      sensor_share(data, coverage, h, e) >= least_sensor_share;
-        if (stands && in_time)
-            stands = !(j->leftover_in_time > 0.0) ||
-                     search_evidence(data, h, fit, e) > dominance_in_time * j->leftover_in_time;
-        else if (stands && j->of_mean) {
-            double evidence = search_evidence(data, h, fit, e);
-            stands = evidence > dominance * j->leftover ||
-                     evidence_beside(box, data, h, fit, e) > fmax(0.05 * evidence, 0.1 * j->leftover);
+        bool stands = is_large_enough(b, e);
+        if (stands && j->of_mean) {
+            double evidence = search_evidence(b->data, b->hypothesis, b->fit, e);
+            stands = evidence > part_of_rest * rest &&
+                     (evidence > dominance * j->leftover ||
+                      evidence_beside(b->box, b->data, b->hypothesis, b->fit, e) >
+                          fmax(0.05 * evidence, 0.1 * j->leftover));
         }
-        if (stands && over_time->found && !in_time)
-            stands = evidence_outside(data, h, fit, e, over_time) > search_threshold(data, e);
+        if (stands && over_time->found)
+            stands = evidence_outside(b->data, b->hypothesis, b->fit, e, over_time) > search_threshold(b->data, e);
         j->stands[e] = stands;
-        j->count += stands;
     }
+}
+
+/// `rest`: what a black box leaves of the residual. Where an effect in time does not stand, what it explained is
+/// unexplained again.
+static bool judge_names(const struct bench *b, const double *rest, const struct structure *over_time,
+                        struct judgement *j)
+{
+    struct structure structure = *over_time, bare = {0};
+    if (!judge_in_time(b, j)) {
+        if (!look_over_time(b->data, NULL, rest, &bare))
+            return false;
+        structure_merge(&structure, &bare);
+    }
+    judge_others(b, &structure, j);
+    for (int e = 0; sim_effects[e]; e++)
+        j->count += j->stands[e];
+    return true;
 }
 
 /// Whether one group of the black box, beside the given model, does as well as three or more names together: one gap,
@@ -219,6 +269,7 @@ static enum blackbox_group one_gap(const struct blackbox *box, const struct fit_
         return blackbox_groups;
     hypothesis_init(&bare, h->given, h->inertia_free, h->actuator_seen);
     bare.sensors_seen = h->sensors_seen;
+    bare.gain_free = h->gain_free;
     enum blackbox_group found = blackbox_groups;
     if (fit_run(&trial, data, &bare, trial_iterations))
         for (int g = 0; g < blackbox_groups && found == blackbox_groups; g++) {
@@ -264,7 +315,6 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
     bool good = rest && look_over_time(data, fit, rest, &over_time);
     if (!good)
         memset(&over_time, 0, sizeof over_time);
-    free(rest);
     if (over_time.found) {
         j->leftover_in_time = over_time.nats;
         if (!j->unexplained || over_time.nats > j->leftover)
@@ -272,7 +322,8 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
         j->unexplained = true;
     }
     if (!worse)
-        judge_names(&box, data, coverage, hypothesis, fit, &over_time, j);
+        good = good && judge_names(&(struct bench){&box, data, coverage, hypothesis, fit}, rest, &over_time, j);
+    free(rest);
     blackbox_free(&box);
     return good;
 }
@@ -313,7 +364,9 @@ size_t judge_ties(const struct fit_data *data, const struct sim_coverage *covera
             struct diagnosis_tie *t = &out_ties[count++];
             t->effects[0] = out;
             t->effects[1] = in;
-            snprintf(t->next, sizeof t->next, "measure %s", sim_effects[out]->measure);
+            snprintf(t->next, sizeof t->next,
+                     "servoscope design --separate %s,%s --model MODEL.json finds the excitation; or measure %s",
+                     sim_effects[out]->id, sim_effects[in]->id, sim_effects[out]->measure);
         }
     }
     fit_free(&without_fit);

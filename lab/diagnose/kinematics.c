@@ -211,6 +211,8 @@ bool kinematics_residual(const struct evidence *evidence, const struct sim_model
 {
     const struct kinematics *self = &evidence->kinematics;
     const struct recording *r = evidence->recording;
+    if (self->values == 0)
+        return true;
     if (!kinematics_concern(model)) {
         memcpy(out, self->target, self->values * sizeof *out);
         return true;

@@ -25,7 +25,9 @@ bool evidence_init(struct evidence *self, const struct recording *recording, dou
     if (self->plan && self->covariance && self->factor && self->work && contrast_init(&self->contrast, recording) &&
         kinematics_init(self)) {
         self->values += self->kinematics.values;
-        return true;
+        self->allowances = calloc(evidence_allowances * self->values, sizeof *self->allowances);
+        if (self->allowances)
+            return true;
     }
     evidence_free(self);
     return false;
@@ -37,6 +39,7 @@ void evidence_free(struct evidence *self)
         fft_plan_destroy(self->plan);
     free(self->covariance);
     free(self->factor);
+    free(self->allowances);
     free(self->work);
     contrast_free(&self->contrast);
     kinematics_free(&self->kinematics);
@@ -114,6 +117,102 @@ static void factorise(const struct evidence *self)
         f[1] = 1.0 / sqrt(rest);
         f[2] = -re * f[1];
         f[3] = -im * f[1];
+    }
+}
+
+static double dot(size_t n, const double *a, const double *b)
+{
+    double sum = 0.0;
+    for (size_t i = 0; i < n; i++)
+        sum += a[i] * b[i];
+    return sum;
+}
+
+static void scale_along(size_t n, const double *unit, double factor, double *io_whitened)
+{
+    double along = (factor - 1.0) * dot(n, unit, io_whitened);
+    for (size_t i = 0; i < n; i++)
+        io_whitened[i] += along * unit[i];
+}
+
+static void apply_allowances(const struct evidence *self, double *io_whitened)
+{
+    for (size_t q = 0; q < self->allowance_count; q++)
+        scale_along(self->values, self->allowances + q * self->values, self->allowance_kept[q], io_whitened);
+}
+
+static void undo_allowances(const struct evidence *self, double *io_whitened)
+{
+    for (size_t q = self->allowance_count; q-- > 0;)
+        scale_along(self->values, self->allowances + q * self->values, 1.0 / self->allowance_kept[q], io_whitened);
+}
+
+static void whiten_spectra(const struct evidence *self, const double *m, const double *a, double *out_whitened)
+{
+    double *w = out_whitened;
+    *w++ = self->factor[0] * m[0];
+    for (size_t k = 1; k <= self->recording->band; k++) {
+        const double *f = self->factor + 4 * k, *mk = m + 2 * k, *ak = a + 2 * k;
+        *w++ = f[0] * mk[0];
+        *w++ = f[0] * mk[1];
+        if (self->channels == 1)
+            continue;
+        *w++ = f[1] * ak[0] + f[2] * mk[0] - f[3] * mk[1];
+        *w++ = f[1] * ak[1] + f[2] * mk[1] + f[3] * mk[0];
+    }
+    memset(w, 0, self->kinematics.values * sizeof *w);
+}
+
+/// Adds the covariance of an error of known shape and unknown size, standard deviation one: of a whitened residual,
+/// 1 / sqrt(1 + |c|^2) is kept along its whitened shape c.
+static void allow(struct evidence *self, const double *mechanics, const double *actuator)
+{
+    double *c = self->allowances + self->allowance_count * self->values;
+    whiten_spectra(self, mechanics, actuator, c);
+    apply_allowances(self, c);
+    double square = dot(self->values, c, c);
+    if (!(square > 0.0 && isfinite(square)))
+        return;
+    for (size_t i = 0; i < self->values; i++)
+        c[i] /= sqrt(square);
+    self->allowance_kept[self->allowance_count++] = 1.0 / sqrt(1.0 + square);
+}
+
+/// Times factor (j w h)^order, w h the angle per sample.
+static void differentiate(size_t bins, size_t samples, double factor, size_t order, double *io_spectrum)
+{
+    for (size_t k = 0; k < bins; k++) {
+        double w = 2.0 * pi * (double)k / (double)samples, size = factor * pow(w, (double)order);
+        double re = io_spectrum[2 * k], im = io_spectrum[2 * k + 1];
+        for (size_t i = 0; i < order; i++) {
+            double held = re;
+            re = -im;
+            im = held;
+        }
+        io_spectrum[2 * k] = size * re;
+        io_spectrum[2 * k + 1] = size * im;
+    }
+}
+
+/// Nobody's torque and speed columns are of the same instant to the microsecond: a skew s makes s jw T. And a speed
+/// that is the derivative of samples is wrong by (w h)^2 / 12 of it, more or less and late or early, by how the torque
+/// changed between them.
+static void make_allowances(struct evidence *self)
+{
+    const double skew = 0.005; // of a sample
+    const struct recording *r = self->recording;
+    size_t bins = r->band + 1, n = r->block.samples;
+    double *shape = self->work + 6 * n, *nothing = shape + 2 * bins;
+    bool reference = self->channels == 2;
+    self->allowance_count = 0;
+    memset(nothing, 0, 2 * bins * sizeof *nothing);
+    evidence_transform(self, r->block.torque, shape);
+    differentiate(bins, n, skew, 1, shape);
+    allow(self, reference ? nothing : shape, reference ? shape : nothing);
+    for (size_t order = 3; r->derived && order <= 4; order++) {
+        evidence_transform(self, r->block.velocity, shape);
+        differentiate(bins, n, self->scale_inertia * r->rate_hz / 12.0, order, shape);
+        allow(self, shape, nothing);
     }
 }
 
@@ -195,7 +294,10 @@ static bool estimate(struct evidence *self, const struct sim_model *model)
     bool good = raw && (self->recording->periodic ? noise_from_periods(self, model, raw)
                                                   : noise_from_residual(self, model, raw));
     free(raw);
-    return good && kinematics_estimate_noise(self, model);
+    if (!good || !kinematics_estimate_noise(self, model))
+        return false;
+    make_allowances(self);
+    return true;
 }
 
 bool evidence_estimate_noise(struct evidence *self, const struct sim_model *model)
@@ -219,7 +321,14 @@ bool evidence_sharpen_noise(struct evidence *self, const double *whitened)
     double *raw = calloc(4 * bins, sizeof *raw);
     if (!raw)
         return false;
-    const double *w = whitened + 1; // bin 0 borrows from its neighbours
+    double *all = malloc(self->values * sizeof *all);
+    if (!all) {
+        free(raw);
+        return false;
+    }
+    memcpy(all, whitened, self->values * sizeof *all);
+    undo_allowances(self, all);
+    const double *w = all + 1; // bin 0 borrows from its neighbours
     for (size_t k = 1; k < bins; k++) {
         const double *f = self->factor + 4 * k;
         double m[2] = {w[0] / f[0], w[1] / f[0]}, a[2] = {0.0, 0.0};
@@ -230,8 +339,10 @@ bool evidence_sharpen_noise(struct evidence *self, const double *whitened)
         accumulate(raw + 4 * k, m, self->channels == 2 ? a : NULL, 1.0);
         w += 2 * self->channels;
     }
+    free(all);
     smooth(self, raw);
     factorise(self);
+    make_allowances(self);
     free(raw);
     return true;
 }
@@ -240,23 +351,14 @@ void evidence_whiten(const struct evidence *self, const double *mechanics, const
 {
     const struct recording *r = self->recording;
     size_t bins = r->band + 1, n = r->block.samples;
-    double *m = self->work + 6 * n, *a = m + 2 * bins, *w = out_whitened;
+    double *m = self->work + 6 * n, *a = m + 2 * bins;
     evidence_transform(self, mechanics, m);
     if (actuator && self->channels == 2)
         evidence_transform(self, actuator, a);
     else
         memset(a, 0, 2 * bins * sizeof *a);
-    *w++ = self->factor[0] * m[0];
-    for (size_t k = 1; k < bins; k++) {
-        const double *f = self->factor + 4 * k, *mk = m + 2 * k, *ak = a + 2 * k;
-        *w++ = f[0] * mk[0];
-        *w++ = f[0] * mk[1];
-        if (self->channels == 1)
-            continue;
-        *w++ = f[1] * ak[0] + f[2] * mk[0] - f[3] * mk[1];
-        *w++ = f[1] * ak[1] + f[2] * mk[1] + f[3] * mk[0];
-    }
-    memset(w, 0, self->kinematics.values * sizeof *w);
+    whiten_spectra(self, m, a, out_whitened);
+    apply_allowances(self, out_whitened);
 }
 
 /// Not a number everywhere: whoever sums squares finds out.

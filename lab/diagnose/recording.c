@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/diagnose/recording.h"
 
+#include "lab/diagnose/gain.h"
 #include "lab/diagnose/motion.h"
 #include "lab/estimate/period_search.h"
 #include "lab/numeric/fft.h"
@@ -102,26 +103,28 @@ static bool take_motion(struct recording *r, const double *position, const doubl
     size_t rows = r->all.samples, period = r->periodic ? r->block.samples : 0;
     r->all.position = malloc(rows * sizeof(double));
     r->all.velocity = malloc(rows * sizeof(double));
-    return r->all.position && r->all.velocity &&
-           motion_estimate(rows, r->rate_hz, position, velocity, period, &r->all, r->motion_from,
-                           sizeof r->motion_from);
+    bool good = r->all.position && r->all.velocity &&
+                motion_estimate(rows, r->rate_hz, position, velocity, period, &r->all, r->motion_from,
+                                sizeof r->motion_from);
+    r->derived = position && !r->all.kinematics;
+    return good;
 }
 
 static int take_columns(const struct run *run, struct recording *r, struct error *out_error)
 {
-    const double *torque = either(run, "torque_Nm", "force_N");
-    const double *reference = either(run, "torque_ref_Nm", "force_ref_N");
+    struct gain_input input = gain_find_input(run);
     const double *position = either(run, "position_rad", "position_m");
     const double *velocity = either(run, "velocity_rad_per_s", "velocity_m_per_s");
-    if (!torque)
-        return refuse_column(run, "torque", "torque_Nm", "force_N", out_error);
+    if (!input.measured)
+        return refuse_column(run, "torque", "torque_Nm, current_A, voltage_V", "force_N", out_error);
     if (!position && !velocity)
         return refuse_column(run, "motion", "position_rad", "position_m", out_error);
     r->all.samples = run->rows;
-    r->all.torque = copied(torque, run->rows);
-    r->all.torque_ref = copied(reference, run->rows);
+    r->input_unit = input.unit;
+    r->all.torque = copied(input.measured, run->rows);
+    r->all.torque_ref = copied(input.reference, run->rows);
     double *raw_position = copied(position, run->rows), *raw_velocity = copied(velocity, run->rows);
-    bool copies = r->all.torque && (!reference || r->all.torque_ref) && (!position || raw_position) &&
+    bool copies = r->all.torque && (!input.reference || r->all.torque_ref) && (!position || raw_position) &&
                   (!velocity || raw_velocity);
     bool good = copies && fill_columns(r, raw_position, raw_velocity) && take_motion(r, raw_position, raw_velocity);
     free(raw_position);
@@ -135,8 +138,8 @@ static size_t find_period(const struct run *run, struct oddities *io_oddities)
 {
     const double nearly_exact = 0.99;
     const size_t fewest = 5; // fewer leave nothing to average, and a start to throw away
-    const double *reference = either(run, "torque_ref_Nm", "force_ref_N");
-    const double *torque = either(run, "torque_Nm", "force_N");
+    struct gain_input input = gain_find_input(run);
+    const double *torque = input.measured, *reference = input.reference;
     struct period_search search;
     if (run->period_samples > 0)
         return oddities_period(run, reference ? reference : torque, io_oddities);

@@ -30,6 +30,8 @@ struct stretch {
 
 struct recording {
     bool linear, periodic;
+    bool derived; ///< the speed is the derivative of the position
+    const char *input_unit; ///< NULL: a torque or a force; "A", "V": what stands for it, in that unit
     double rate_hz;
     size_t periods;       ///< counted ones; 1 if not periodic
     struct stretch block; ///< what has to be explained

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/diagnose/repair.h"
 
+#include "lab/diagnose/gain.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +16,7 @@ static void notice(const struct run *run, bool *rows, bool *io_lost, struct repa
 {
     struct sim_columns columns = {.rows = run->rows,
                                   .sample_rate_hz = run->sample_rate_hz,
-                                  .torque = either(run, "torque_Nm", "force_N"),
+                                  .torque = gain_find_input(run).measured,
                                   .position = either(run, "position_rad", "position_m"),
                                   .velocity = either(run, "velocity_rad_per_s", "velocity_m_per_s")};
     double doubt = 12.0 + 0.5 * log((double)run->rows);

@@ -201,23 +201,49 @@ static bool restructures(int effect, const struct hypothesis *from, const struct
     return trial->engaged.structure != from->engaged.structure || e->attach || e->bend || e->build_up;
 }
 
-/// Where the structure changes, derivatives of the old one are worth nothing: every scan value gets one step of its
-/// own, the lowest few a short fit.
+/// What a step brings does not make up for this: a start so many times worse than the best of its scan, a place so many
+/// times worse after its step than the best, a scan whose best place is so many times worse than the model without.
+static const double start_too_far = 30.0, place_too_far = 4.0, scan_too_far = 30.0;
+
+/// The scan values with one step each, the lowest cost first; returns how many are worth more.
+static size_t step_restructured(struct fit *scratch, const struct fit_data *data, const struct hypothesis *from,
+                                int effect, double values[][sim_effect_parameters_max], size_t count,
+                                struct candidate *out_list)
+{
+    size_t stepped = 0;
+    double lowest = INFINITY;
+    for (size_t i = 0; i < count; i++) {
+        out_list[i].hypothesis = *from;
+        hypothesis_name(&out_list[i].hypothesis, effect, values[i]);
+        out_list[i].cost = fit_cost(scratch, data, &out_list[i].hypothesis, out_list[i].hypothesis.x);
+        lowest = fmin(lowest, out_list[i].cost);
+    }
+    qsort(out_list, count, sizeof *out_list, by_cost);
+    while (stepped < count && out_list[stepped].cost <= start_too_far * lowest) {
+        struct candidate *place = &out_list[stepped++];
+        place->cost = fit_roughly(scratch, data, &place->hypothesis, 1) ? scratch->cost : INFINITY;
+    }
+    qsort(out_list, stepped, sizeof *out_list, by_cost);
+    return stepped;
+}
+
+/// Where the structure changes, derivatives of the old one are worth nothing: scan values get one step of their own,
+/// the lowest few a short fit. `cost`: of the model without.
 static void scan_restructured(struct fit *scratch, const struct fit_data *data, const struct hypothesis *from,
-                              int effect, double values[][sim_effect_parameters_max], size_t count,
+                              double cost, int effect, double values[][sim_effect_parameters_max], size_t count,
                               struct candidate *out)
 {
     enum { tried = 4 };
     struct candidate *list = calloc(count, sizeof *list);
     if (!list)
         return;
-    for (size_t i = 0; i < count; i++) {
-        list[i].hypothesis = *from;
-        hypothesis_name(&list[i].hypothesis, effect, values[i]);
-        list[i].cost = fit_roughly(scratch, data, &list[i].hypothesis, 1) ? scratch->cost : INFINITY;
+    size_t stepped = step_restructured(scratch, data, from, effect, values, count, list);
+    if (stepped > 0 && isfinite(list[0].cost)) {
+        out->cost = list[0].cost;
+        out->hypothesis = list[0].hypothesis;
     }
-    qsort(list, count, sizeof *list, by_cost);
-    for (size_t i = 0; i < tried && i < count; i++)
+    bool hopeless = !(out->cost <= scan_too_far * cost);
+    for (size_t i = 0; i < tried && i < stepped && !hopeless && list[i].cost <= place_too_far * out->cost; i++)
         if (fit_roughly(scratch, data, &list[i].hypothesis, scan_iterations) && scratch->cost < out->cost) {
             out->cost = scratch->cost;
             out->hypothesis = list[i].hypothesis;
@@ -237,7 +263,7 @@ static bool scan_effect(struct fit *scratch, const struct fit_data *data, const 
         struct hypothesis trial = *from;
         hypothesis_name(&trial, effect, values[i]);
         if (restructures(effect, from, &trial)) {
-            scan_restructured(scratch, data, from, effect, values, count, out);
+            scan_restructured(scratch, data, from, fit->cost, effect, values, count, out);
             break;
         }
         if (fit_step(scratch, data, from, fit, &trial) && scratch->cost < out->cost) {

@@ -42,10 +42,38 @@ static size_t split_octaves(size_t band, struct octave out[octaves_most])
     return count;
 }
 
+static void add_place(struct structure *s, size_t first, size_t last)
+{
+    if (s->place_count == structure_places_max)
+        return;
+    s->place_first[s->place_count] = first;
+    s->place_last[s->place_count++] = last;
+}
+
+void structure_merge(struct structure *self, const struct structure *other)
+{
+    struct structure sum = !self->found || (other->found && other->nats > self->nats) ? *other : *self;
+    const struct structure *rest = sum.nats == self->nats && self->found ? other : self;
+    for (size_t i = 0; i < rest->place_count; i++)
+        add_place(&sum, rest->place_first[i], rest->place_last[i]);
+    *self = sum;
+}
+
+bool structure_holds(const struct structure *self, size_t bin)
+{
+    for (size_t i = 0; i < self->place_count; i++)
+        if (bin >= self->place_first[i] && bin <= self->place_last[i])
+            return true;
+    return false;
+}
+
 static void keep(struct structure *s, const struct octave *at, double nats, double excess, double places,
                  const char *where)
 {
-    if (!(nats > floor_nats + log(places)) || !(excess > least_excess) || (s->found && nats <= s->nats))
+    if (!(nats > floor_nats + log(places)) || !(excess > least_excess))
+        return;
+    add_place(s, at->from, at->to - 1);
+    if (s->found && nats <= s->nats)
         return;
     s->found = true;
     s->nats = nats;

@@ -5,14 +5,24 @@
 
 #include "lab/diagnose/noise.h"
 
+enum { structure_places_max = 24 };
+
 /// Something beyond chance. Nats are log-likelihood ratios against equal variance.
 struct structure {
     bool found;
-    double nats;
+    double nats;                ///< of the strongest, as are excess, the bins and the words
     double excess;              ///< its power over that of the rest
     size_t first_bin, last_bin; ///< of the block, where it is
     char where[160];            ///< empty if nothing was found
+    size_t place_count;         ///< all that were found; more than structure_places_max are left out
+    size_t place_first[structure_places_max], place_last[structure_places_max]; ///< bins
 };
+
+/// Adds the places of another structure, whose words are kept if it is the stronger one.
+void structure_merge(struct structure *self, const struct structure *other);
+
+/// Whether a bin lies in one of the places.
+bool structure_holds(const struct structure *self, size_t bin);
 
 /// Looks, in the contrasts that a model leaves, for a change from period to period that is slower than the rest (per
 /// octave of frequency), for a constant part that differs between periods by more than the lines next to it, for a

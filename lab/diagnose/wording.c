@@ -175,7 +175,10 @@ size_t wording_next(const struct diagnosis *self, size_t max, char (*out_texts)[
     for (; count < self->tie_count && count < max; count++) {
         char one[wording_short], other[wording_short];
         wording_effect(self->ties[count].effects[0], one);
-        wording_effect(self->ties[count].effects[1], other);
+        if (self->ties[count].effects[1] == diagnosis_gain)
+            snprintf(other, sizeof other, "the gain of the input");
+        else
+            wording_effect(self->ties[count].effects[1], other);
         snprintf(out_texts[count], wording_size, "To tell %s from %s: %s.", one, other, self->ties[count].next);
     }
     if (self->verdict == diagnosis_unexplained) {

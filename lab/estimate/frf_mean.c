@@ -4,6 +4,7 @@
 #include "lab/estimate/circle.h"
 #include "lab/estimate/method.h"
 #include "lab/numeric/clones.h"
+#include "lab/numeric/statistics.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -16,6 +17,10 @@ static double power(double complex z)
 
 /// Lines are worked on in blocks whose values of all periods stay in the second cache while they are passed over twice.
 enum { block_lines = 512, block_values = 16384, fewest_block_lines = 16 };
+
+enum { few_periods = 3, neighbours = 8 }; ///< periods that tell too little of scatter; lines on each side that help
+
+static const double efficiency_of_median = 0.48;
 
 static size_t lines_in_block(size_t periods)
 {
@@ -64,12 +69,38 @@ CLONED_FOR_AVX2 static void sum_scatter(const struct periodic *recording, size_t
     }
 }
 
+/// Two or three periods tell one line's scatter so badly that a line would have to stand 30 dB above it to count; its
+/// neighbours' is much the same, and their median is certain. In place of the line's own, by degrees of freedom.
+static double pooled_scatter(const struct block *block, size_t lines, size_t b, double own_dof, double *out_dof)
+{
+    double values[2 * neighbours + 1];
+    size_t count = 0;
+    for (size_t other = b > neighbours ? b - neighbours : 0; other <= b + neighbours && other < lines; other++) {
+        values[count++] = block->input_scatter[other];
+    }
+    /* Median over mean of chi-square, after Wilson and Hilferty; and how much of the numbers it tells. */
+    const double share = 1.0 - 1.0 / (9.0 * own_dof);
+    const double dof = efficiency_of_median * own_dof * (double)(count - 1);
+    const double median = statistics_median(values, count) / (share * share * share);
+    *out_dof = own_dof + dof;
+    return (own_dof * block->input_scatter[b] + dof * median) / *out_dof;
+}
+
+static bool has_power_of_few(const struct block *block, size_t lines, size_t b, double count)
+{
+    double dof;
+    const double power_of_mean = count * power(block->input[b]);
+    const double variance = pooled_scatter(block, lines, b, count - 1.0, &dof) / (count - 1.0);
+    return power_of_mean > 0.0 && dof * log1p(power_of_mean / variance / dof) > -log(estimate_chance_of_dead_line);
+}
+
 static void estimate_block(const struct periodic *recording, size_t first, size_t lines, struct block *io_block,
                            struct frf *io_frf)
 {
     double complex responses[block_lines];
     double count = (double)recording->used;
-    double certain_ratio = circle_certain_ratio(estimate_chance_of_dead_line, recording->used);
+    const bool few = recording->used <= few_periods;
+    const double certain_ratio = circle_certain_ratio(estimate_chance_of_dead_line, recording->used);
     sum_means(recording, first, lines, io_block);
     for (size_t b = 0; b < lines; b++) {
         /* Part by part: a quotient of complex numbers would look for infinities each time. */
@@ -81,7 +112,8 @@ static void estimate_block(const struct periodic *recording, size_t first, size_
     sum_scatter(recording, first, lines, responses, io_block);
     for (size_t b = 0; b < lines; b++) {
         double input_power = power(io_block->input[b]);
-        if (count * input_power > certain_ratio * io_block->input_scatter[b] / (count - 1.0)) {
+        if (few ? has_power_of_few(io_block, lines, b, count)
+                : count * input_power > certain_ratio * io_block->input_scatter[b] / (count - 1.0)) {
             double variance = io_block->residual[b] / (count * (count - 1.0) * input_power);
             estimate_set_line(io_frf, first + b, responses[b], sqrt(variance));
         }

@@ -19,7 +19,8 @@
 ///
 /// Units:     std in units of G, sqrt(E|error|^2) of the complex value; 95 % region (circle_confidence_factor):
 ///            |error| <= std sqrt(F_0.95(2, 2(M-1))), not 2 std
-/// Validity:  a line whose mean input could be scatter alone (F test, chance above 1e-3) is not valid
+/// Validity:  a line whose mean input could be scatter alone (F test, chance above 1e-3) is not valid; with two or
+///            three periods the scatter is that of the 17 lines around it as well
 /// Errors:    error_refused if no line has power in the input, or memory is short; *out_frf is empty then
 /// Test:      tests/unit/test_frf_mean.c
 int frf_mean_estimate(const struct periodic *recording, const struct estimate_options *options, struct frf *out_frf,

@@ -238,11 +238,12 @@ static int refuse_scatter(const struct periodic *recording, struct error *out_er
     return error_set(
         out_error, error_refused,
         "%s: %s has no power above its scatter on any of %zu lines: the clearest, %.6g Hz, has an "
-        "amplitude of %.3g, and %zu periods leave it uncertain by %.3g: expected an excited input, see "
+        "amplitude of %.3g, and %zu periods leave it uncertain by %.3g%s: expected an excited input, see "
         "--input, --lines, or more periods",
         recording->run->path, recording->input, recording->bin_count,
         (double)recording->bins[strongest] * recording->run->sample_rate_hz / (double)recording->period_samples,
-        to_amplitude * cabs(line.mean), recording->used, to_amplitude * sqrt(line.variance / (double)recording->used));
+        to_amplitude * cabs(line.mean), recording->used, to_amplitude * sqrt(line.variance / (double)recording->used),
+        recording->used < 4 ? ", which so few periods tell badly" : "");
 }
 
 int estimate_end(const struct periodic *recording, struct frf *io_frf, struct error *out_error)

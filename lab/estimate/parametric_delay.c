@@ -6,9 +6,6 @@
 
 #include <math.h>
 
-/// A free delay has to shorten the description by as much, in nats.
-static const double surely_shorter = 5.0;
-
 /// Held input acts one sample later at the earliest: that it acts at once has to shorten the description by as much.
 static const double as_short = 3.0;
 
@@ -56,21 +53,23 @@ static void find_samples(const struct parametric_data *data, size_t order_max,
     io_structure->delay_s = best / data->sample_rate_hz;
 }
 
+/// With a delay no more poles are needed than without.
 static void find_time(const struct parametric_data *data, size_t order_max, struct parametric_structure *io_structure)
 {
     struct parametric_structure trial = *io_structure;
-    struct parametric_model model;
+    struct parametric_model without;
+    struct parametric_model with;
     double fastest_hz = 0.0;
     for (size_t k = 0; k < data->count; k++) {
         fastest_hz = fmax(fastest_hz, data->frequency_hz[k]);
     }
+    double length = parametric_shortest(data, io_structure, order_max, &without);
     trial.delay_free = true;
-    double without = parametric_shortest(data, io_structure, order_max, NULL);
-    double with = parametric_shortest(data, &trial, order_max, &model);
-    if (with < without - surely_shorter && model.delay_s > 0.0) {
+    order_max = isfinite(length) ? without.structure.denominator_order : order_max;
+    if (parametric_shortest(data, &trial, order_max, &with) < length && with.delay_s > 0.0) {
         double around_s = 0.25 / fastest_hz;
         io_structure->delay_free = true;
-        io_structure->delay_s = fmax(model.delay_s - around_s, 0.0);
+        io_structure->delay_s = fmax(with.delay_s - around_s, 0.0);
         io_structure->delay_limit_s = 2.0 * around_s;
     }
 }

@@ -12,7 +12,7 @@ enum { parametric_delay_samples_max = 16 };
 /// gets a free delay and where to look for it.
 ///
 /// Criterion: least description length over models with as many zeros as poles, 1, 2, ... up to `order_max`; one sample
-///            rather than none unless none is shorter by 3 nats, and a free delay only for 5
+///            rather than none unless none is shorter by 3 nats
 /// Cost:      24 to 102 fits for a discrete model
 /// Test:      tests/unit/test_parametric_delay.c
 void parametric_delay_find(const struct parametric_data *data, size_t order_max,

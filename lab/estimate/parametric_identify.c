@@ -51,6 +51,27 @@ static void note_misfit(const struct parametric_model *model, struct parametric_
     io_outcome->misfit = parametric_misfit(model);
 }
 
+/// The drive without the hold; where the coefficient for a part of a sample of delay speaks for none, that of the model
+/// without it.
+static bool find_plant(const struct parametric_data *data, const struct parametric_model *model,
+                       struct parametric_model *out_plant)
+{
+    struct parametric_structure structure = model->structure;
+    struct parametric_model whole;
+    bool found = parametric_plant_of(model, out_plant);
+    bool shorter = !found && structure.domain == parametric_discrete && structure.numerator_order > 0 &&
+                   structure.numerator_order == structure.denominator_order;
+    structure.numerator_order -= shorter ? 1 : 0;
+    if (shorter && parametric_fit(data, &structure, NULL, &whole, NULL) == 0) {
+        parametric_inflate(&whole, parametric_misfit(&whole));
+        found = parametric_plant_of(&whole, out_plant);
+    }
+    if (found) {
+        parametric_mark_cancelling(out_plant);
+    }
+    return found;
+}
+
 static bool can_be_sampled(const struct parametric_data *data)
 {
     bool can = data->sample_rate_hz > 0.0;
@@ -60,23 +81,18 @@ static bool can_be_sampled(const struct parametric_data *data)
     return can;
 }
 
-/// Whether a model needs all the orders there are, or they are not enough.
-static bool strained(const struct parametric_outcome *outcome)
-{
-    return outcome->misfit > 1.0 || outcome->model.structure.denominator_order + 1 >= order_max;
-}
-
 static void look_at_other_domain(const struct parametric_data *data, struct parametric_outcome *io_outcome)
 {
     const struct parametric_model *model = &io_outcome->model;
     bool discrete = model->structure.domain == parametric_discrete;
     struct parametric_structure other = {.domain = discrete ? parametric_continuous : parametric_discrete};
     struct parametric_model best;
-    if (!can_be_sampled(data) || (discrete && !strained(io_outcome))) {
+    if (!can_be_sampled(data)) {
         return;
     }
-    parametric_delay_find(data, highest_order(data), &other);
-    double length = parametric_shortest(data, &other, highest_order(data), &best);
+    // More poles than this model has would be no improvement.
+    parametric_delay_find(data, model->structure.denominator_order, &other);
+    double length = parametric_shortest(data, &other, model->structure.denominator_order, &best);
     double own = io_outcome->orders.rows[io_outcome->orders.by_mdl].mdl;
     bool simpler = length < own && best.structure.denominator_order < model->structure.denominator_order;
     if (length < own - (simpler ? simpler_other : surely_other)) {
@@ -113,10 +129,7 @@ static int complete(const struct parametric_data *data, const struct parametric_
     }
     parametric_inflate(model, parametric_misfit(model));
     parametric_mark_cancelling(model);
-    io_outcome->has_plant = parametric_plant_of(model, &io_outcome->plant);
-    if (io_outcome->has_plant) {
-        parametric_mark_cancelling(&io_outcome->plant);
-    }
+    io_outcome->has_plant = find_plant(data, model, &io_outcome->plant);
     look_at_other_domain(data, io_outcome);
     io_outcome->made = true;
     return 0;

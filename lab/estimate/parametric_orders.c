@@ -293,9 +293,9 @@ static size_t simplest(const struct study *study, const struct parametric_orders
 }
 
 /// Of rows with as many poles, as stable and as little doubtful, the one with the numerator to keep. A coefficient that
-/// is left out although it is there moves the response by more than the model's deviations say, and so does one that was
-/// taken because it looked large; one that was asked for anyway does not. Held input needs as many as there are poles,
-/// and one for a part of a sample. In s, where most of them would be zeros far away, Akaike's criterion chooses.
+/// is left out although it is there moves the response by more than the model's deviations say, and so does one that
+/// was taken because it looked large; one that was asked for anyway does not. Held input needs as many as there are
+/// poles, and one for a part of a sample. In s, where most of them would be zeros far away, Akaike's criterion chooses.
 static size_t best_numerator(const struct study *study, const struct parametric_orders *orders, size_t row)
 {
     const double nats = 2.0; // for a parameter, instead of the logarithm of the number of lines

@@ -37,8 +37,10 @@ struct parametric_orders {
     /// As few poles as a row has that is stable, not doubtful, and that no larger such row surely betters: that noise
     /// alone gains as much has a chance below one in a thousand (F test, counting that a resonance could be found at
     /// any line), and lines not fitted agree by more than one standard error. Description length alone adds poles that
-    /// are not there in every eighth fit. Of the rows with as many poles that with the numerator that Akaike's
-    /// criterion prefers: what is left out there by mistake moves the response by more than its deviations say.
+    /// are not there in every eighth fit.
+    /// Of the rows with as many poles: of a discrete model the one with as many zeros, of a continuous one that which
+    /// Akaike's criterion prefers; what is left out or taken by mistake moves the response by more than its deviations
+    /// say.
     size_t chosen;
     char why[320]; ///< one sentence
 };

@@ -158,6 +158,31 @@ static size_t pool_errors(const struct parametric_weights *self, const struct pa
     return found;
 }
 
+/// Pools how many times their noise the variances are, where noise is known apart: that of few realisations. Returns
+/// the window, 1: not done.
+static size_t pool_ratios(const struct parametric_weights *self, const struct parametric_data *data, size_t window)
+{
+    size_t count = data->count;
+    double *ratio = malloc(count * sizeof *ratio);
+    bool apart = false;
+    size_t found = 1;
+    for (size_t k = 0; k < count && ratio; k++) {
+        apart = apart || self->noise_share[k] != 1.0;
+        ratio[k] = 1.0 / self->noise_share[k];
+    }
+    if (ratio && apart) {
+        found = find_window(ratio, NULL, count, window, data->variance_dof);
+        found = found > 1 && average(ratio, count, found) ? found : 1;
+    }
+    for (size_t k = 0; k < count && found > 1; k++) {
+        double noise = self->output_variance[k] * self->noise_share[k];
+        self->output_variance[k] = noise * ratio[k];
+        self->noise_share[k] = fmin(1.0, 1.0 / ratio[k]);
+    }
+    free(ratio);
+    return found;
+}
+
 /// Pools the noise of output and input each by itself. Returns the window, 1: not done.
 static size_t pool_each(const struct parametric_weights *self, const struct parametric_data *data, bool input,
                         size_t window)
@@ -182,6 +207,8 @@ size_t parametric_weights_pool(const struct parametric_weights *self, struct par
     size_t pooled = pool_each(self, io_data, input, window);
     if (pooled == 1 && input) {
         pooled = pool_errors(self, io_data, window);
+    } else if (pooled == 1 && self->noise_share) {
+        pooled = pool_ratios(self, io_data, window);
     }
     io_data->variance_dof = dof * (double)pooled;
     return pooled;

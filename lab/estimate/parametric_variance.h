@@ -22,6 +22,9 @@ struct parametric_weights {
 /// Loops:  where output or input by itself does not scatter alike, but Y - G U does, as in a closed loop, that is
 ///         pooled
 ///         and counted as the output's, if the input's noise is below a thousandth of its power at every line
+/// Runs:   where the variances are not noise alone and do not scatter alike, how many times the noise they are may:
+///         that
+///         is pooled then
 /// Test:   tests/unit/test_parametric_variance.c
 size_t parametric_weights_pool(const struct parametric_weights *self, struct parametric_data *io_data);
 

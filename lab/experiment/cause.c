@@ -88,7 +88,7 @@ static double within(const struct sim_parameter *p, bool linear, double value)
     return linear ? fmin(fmax(value, p->linear_minimum), p->linear_maximum) : fmin(fmax(value, p->minimum), p->maximum);
 }
 
-/// Nats by which a drive with the cause at `size` away from nothing shows it, everything else refitted; -1: no such drive.
+/// Nats by which a drive with the cause at `size` away from nothing shows it, the rest refitted; -1: cannot be played.
 static double evidence_at(const struct cause_trial *trial, double nothing, double size, struct separation_cause *cause,
                           struct error *out_error)
 {

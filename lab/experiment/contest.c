@@ -145,6 +145,7 @@ bool contest_decide(const struct contest *self, int cause, const double *values,
     out_outcome->evidence = 0.5 * (self->fit.cost - cost);
     out_outcome->rival_evidence = 0.5 * (self->fit.cost - rival_cost);
     out_outcome->nats = 0.5 * (rival_cost - cost);
+    out_outcome->misfit = cost / (double)self->data.values;
     return good;
 }
 

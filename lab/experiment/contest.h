@@ -38,6 +38,7 @@ struct contest_outcome {
     double evidence;         ///< nats that the cause gains over the given model refitted
     double nats;             ///< nats by which it beats its rival: the separation
     double rival_evidence;   ///< nats that the rival gains over the given model refitted
+    double misfit;           ///< mean squared whitened residual with the right cause: about 1, or the fit is none
     struct hypothesis rival; ///< with the rival's best numbers
 };
 

@@ -12,7 +12,7 @@ const double separation_tie_nats = 6.0;
 static const uint64_t seed_step = 16;
 
 /// Seeds by purpose.
-enum { repeats = 2, seed_of_sizes = 0, seed_of_candidates, seed_of_checks = seed_of_candidates + 2 * repeats };
+enum { repeats = 3, seed_of_sizes = 0, seed_of_candidates, seed_of_checks = seed_of_candidates + 2 * repeats };
 
 struct work {
     const struct separation_request *request;
@@ -108,7 +108,7 @@ static int design_candidates(struct work *w, struct error *out_error)
 {
     struct separation *s = w->separation;
     int status = 0;
-    for (size_t i = 0; !status && i < variant_kinds; i++) {
+    for (size_t i = 0; !status && i < variant_longer; i++) {
         status = tell(w, "designing", out_error);
         status = status ? status
                         : variant_design(&w->request->basis, (enum variant_kind)i,
@@ -172,30 +172,64 @@ static int choose_sizes(struct work *w, struct error *out_error)
     return status;
 }
 
-/// Both directions of one excitation. One that cannot be played on these drives is no candidate.
+/// Beyond this the right cause does not explain its own simulation: what else would be said there means nothing.
+static const double most_misfit = 4.0;
+
+/// What one excitation says of both directions under one noise.
+struct verdict {
+    double nats; ///< the smaller
+    double evidence[2], misfit[2];
+};
+
+static int compete_both(const struct work *w, const struct variant *excitation, uint64_t seed,
+                        struct verdict *out_verdict, struct error *out_error)
+{
+    out_verdict->nats = INFINITY;
+    for (size_t i = 0; i < 2; i++) {
+        struct contest_outcome outcome;
+        int status = compete(w, excitation, i, seed + i, &outcome, out_error);
+        if (status)
+            return status;
+        out_verdict->nats = fmin(out_verdict->nats, outcome.nats);
+        out_verdict->evidence[i] = outcome.evidence;
+        out_verdict->misfit[i] = outcome.misfit;
+    }
+    return 0;
+}
+
+static int check_misfit(const struct separation *s, const struct verdict *verdict, struct error *out_error)
+{
+    for (size_t i = 0; i < 2; i++)
+        if (!(verdict->misfit[i] <= most_misfit))
+            return error_set(out_error, error_refused,
+                             "diagnosis does not explain %s there, even knowing it: misfit %.3g, expected about 1",
+                             sim_effects[s->causes[i].effect]->id, verdict->misfit[i]);
+    return 0;
+}
+
+/// The mean over a few noises of one excitation. One that cannot be played on these drives, or not be explained, is no
+/// candidate.
 static int measure_candidate(struct work *w, struct separation_candidate *c, struct error *out_error)
 {
     struct error why = {0};
-    int status = tell(w, c->excitation.says, out_error);
+    int status = tell(w, c->excitation.says, out_error), failed = 0;
     if (status || c->excitation.table_count == 0)
         return status;
-    c->nats = INFINITY;
-    for (size_t i = 0; !why.status && i < 2; i++) {
-        double nats = 0.0;
-        for (size_t repeat = 0; !why.status && repeat < repeats; repeat++) {
-            struct contest_outcome outcome = {0};
-            compete(w, &c->excitation, i, seed_of_candidates + 2 * repeat + i, &outcome, &why);
-            nats += outcome.nats / repeats;
-            c->evidence[i] += outcome.evidence / repeats;
-        }
-        c->nats = fmin(c->nats, nats);
+    c->nats = c->evidence[0] = c->evidence[1] = 0.0;
+    for (uint64_t i = 0; !failed && i < repeats; i++) {
+        struct verdict verdict;
+        failed = compete_both(w, &c->excitation, seed_of_candidates + 2 * i, &verdict, &why);
+        failed = failed ? failed : check_misfit(w->separation, &verdict, &why);
+        if (failed)
+            break;
+        c->nats += verdict.nats / repeats;
+        c->evidence[0] += verdict.evidence[0] / repeats;
+        c->evidence[1] += verdict.evidence[1] / repeats;
     }
-    c->measured = !why.status;
-    if (!c->measured)
+    c->measured = !failed;
+    if (failed)
         snprintf(c->excitation.why_not, sizeof c->excitation.why_not, "%.*s", (int)sizeof c->excitation.why_not - 1,
                  why.message);
-    if (!c->measured && c->excitation.kind == variant_as_given)
-        return error_set(out_error, why.status, "the excitation as given: %s", why.message);
     return 0;
 }
 
@@ -203,6 +237,7 @@ static int measure_candidate(struct work *w, struct separation_candidate *c, str
 static void choose(const struct separation_request *request, struct separation *s)
 {
     s->chosen = -1;
+    s->enough = false;
     for (int i = 0; i < variant_kinds; i++) {
         const struct separation_candidate *c = &s->candidates[i];
         if (!c->measured || !(c->nats >= separation_tie_nats))
@@ -218,23 +253,60 @@ static void choose(const struct separation_request *request, struct separation *
     }
 }
 
+/// The one that gains most in a second; NULL: none gains anything.
+static const struct separation_candidate *most_promising(const struct separation *s)
+{
+    const double promising_nats = 1.0;
+    const struct separation_candidate *best = NULL;
+    for (size_t i = 0; i < variant_longer; i++) {
+        const struct separation_candidate *c = &s->candidates[i];
+        if (c->measured && c->nats > promising_nats &&
+            (!best || c->nats / c->excitation.test_time_s > best->nats / best->excitation.test_time_s))
+            best = c;
+    }
+    return best;
+}
+
+/// Where none is enough: the most promising one for as long as it takes. Nats grow with the periods, if not exactly:
+/// what few periods say of the noise is a guess.
+static int prolong_best(struct work *w, struct error *out_error)
+{
+    enum { passes = 3 };
+    const double margin = 1.3, most_times = 16.0;
+    struct separation *s = w->separation;
+    struct separation_candidate *longer = &s->candidates[variant_longer];
+    const struct separation_candidate *best = most_promising(s);
+    double nats = best ? best->nats : 0.0, times = 1.0;
+    int status = 0;
+    if (!best)
+        snprintf(longer->excitation.why_not, sizeof longer->excitation.why_not, "none separates them");
+    for (int pass = 0; !status && nats > 0.0 && nats < w->request->enough_nats && pass < passes; pass++) {
+        double needed = ceil(times * margin * w->request->enough_nats / nats);
+        if (!(times < most_times))
+            break;
+        times = fmin(fmax(needed, times + 1.0), most_times);
+        variant_free(&longer->excitation);
+        status = variant_prolong(&best->excitation, (size_t)times, &longer->excitation, out_error);
+        status = status ? status : measure_candidate(w, longer, out_error);
+        nats = longer->measured ? longer->nats : 0.0;
+    }
+    return status;
+}
+
 static int check_chosen(struct work *w, struct error *out_error)
 {
     struct separation *s = w->separation;
-    for (s->checked = 0; s->chosen >= 0 && s->checked < separation_checks; s->checked++) {
-        double least = INFINITY;
-        int status = tell(w, "checking with fresh noise", out_error);
-        for (size_t i = 0; !status && i < 2; i++) {
-            struct contest_outcome outcome;
-            status = compete(w, &s->candidates[s->chosen].excitation, i, seed_of_checks + 2 * s->checked + i, &outcome,
-                             out_error);
-            least = fmin(least, outcome.nats);
-        }
-        if (status)
-            return status;
-        s->checked_nats[s->checked] = least;
+    int status = 0;
+    for (s->checked = 0; !status && s->chosen >= 0 && s->checked < separation_checks; s->checked++) {
+        struct verdict verdict;
+        status = tell(w, "checking with fresh noise", out_error);
+        status = status ? status
+                        : compete_both(w, &s->candidates[s->chosen].excitation, seed_of_checks + 2 * s->checked,
+                                       &verdict, out_error);
+        if (!status)
+            s->checked_nats[s->checked] = verdict.nats;
     }
-    return 0;
+    return status;
 }
 
 /// Why nothing separates them: too small to be seen at all, or alike in every motion.
@@ -248,15 +320,21 @@ static void explain(struct separation *s)
             most = fmax(most, s->candidates[i].nats);
         }
     size_t fainter = evidence[1] < evidence[0];
-    if (evidence[fainter] < 2.0 * separation_tie_nats)
+    if (isinf(most))
+        snprintf(
+            s->reason, sizeof s->reason,
+            "%.200s under the excitation as given, and likewise under the others: more noise than the model has, or "
+            "another size, may help",
+            s->candidates[variant_as_given].excitation.why_not);
+    else if (evidence[fainter] < 2.0 * separation_tie_nats)
         snprintf(s->reason, sizeof s->reason,
                  "%s is too small to be seen: %.3g nats over the model without it at best; it takes a larger one, less "
                  "noise or more time to say what it is",
                  ids[fainter], evidence[fainter]);
     else
         snprintf(s->reason, sizeof s->reason,
-                 "%s and %s do the same in every motion tried: seen with %.3g and %.3g nats, they differ by %.2g at "
-                 "most; for this drive they are one cause under two names, so take the simpler one",
+                 "%s and %s do the same in every motion tried: seen with %.0f and %.0f nats, they differ by %.1f at "
+                 "most; within these limits they are one cause under two names, so take the simpler one",
                  ids[0], ids[1], evidence[0], evidence[1], fmax(most, 0.0));
 }
 
@@ -266,11 +344,16 @@ int separation_run(const struct separation_request *request, struct separation *
     struct work w = {.request = request, .separation = s, .total = 2 * variant_kinds + 1 + separation_checks};
     memset(s, 0, sizeof *s);
     s->chosen = -1;
+    s->candidates[variant_longer].excitation = (struct variant){.kind = variant_longer, .why_not = "not needed"};
     int status = take_causes_out(&w, out_error);
     status = status ? status : design_candidates(&w, out_error);
     status = status ? status : choose_sizes(&w, out_error);
-    for (size_t i = 0; !status && i < variant_kinds; i++)
+    for (size_t i = 0; !status && i < variant_longer; i++)
         status = measure_candidate(&w, &s->candidates[i], out_error);
+    if (!status) {
+        choose(request, s);
+        status = s->enough ? 0 : prolong_best(&w, out_error);
+    }
     if (!status) {
         choose(request, s);
         status = check_chosen(&w, out_error);

@@ -4,7 +4,7 @@
 ///
 /// A drive is simulated with one cause, and the other tries to explain what was recorded; then the other way round,
 /// with the second cause at the size at which it imitates the first one best. The smaller result counts. Everything is
-/// judged by diagnosis itself; nothing here knows a cause by name.
+/// judged by diagnosis itself (docs/theory.md, F62); nothing here knows a cause by name.
 #ifndef SERVOSCOPE_EXPERIMENT_SEPARATION_H
 #define SERVOSCOPE_EXPERIMENT_SEPARATION_H
 
@@ -20,7 +20,7 @@ extern const double separation_tie_nats;
 struct separation_candidate {
     struct variant excitation;
     bool measured;      ///< false: not possible; excitation.why_not says why
-    double nats;        ///< the smaller of both directions
+    double nats;        ///< the smaller of both directions, mean over a few noises
     double evidence[2]; ///< nats of each cause over the model without it: it can show at all
 };
 
@@ -49,9 +49,9 @@ struct separation {
 int separation_parse(const char *text, int out_effects[2], struct error *out_error);
 
 /// Takes both causes out of the model, makes the excitations, lets the causes compete, chooses, checks.
-/// Errors: error_refused: a cause that cannot act in this model or that no fit names, an excitation as given that cannot
-///         be designed or played, stopped by progress, memory is short; *out_separation is empty then
-/// Cost:   some thirty fits of one cause each
+/// Errors: error_refused: a cause that cannot act in this model or that no fit names, an excitation as given that
+///         cannot be designed or played, stopped by progress, memory is short; *out_separation is empty then
+/// Cost:   about a hundred fits of one cause each
 /// Test:   tests/unit/test_separation.c
 int separation_run(const struct separation_request *request, struct separation *out_separation,
                    struct error *out_error);

@@ -9,12 +9,13 @@
 static const double two_pi = 6.283185307179586;
 
 /// Fewer periods than this leave too little scatter to estimate noise from.
-enum { fewest_periods = 4 };
+enum { fewest_periods = 6 };
 
 const char *variant_kind_str(enum variant_kind kind)
 {
     static const char *const names[variant_kinds] = {
-        "as_given", "half_level", "small_level", "wide_lines", "slow_stroke", "both_directions", "more_periods",
+        "as_given",    "half_level",      "small_level",  "wide_lines",
+        "slow_stroke", "both_directions", "more_periods", "longer",
     };
     return kind < variant_kinds ? names[kind] : "unknown";
 }
@@ -94,11 +95,11 @@ static void scale_result(struct design_result *r, double level)
     r->bound_Nm *= level;
 }
 
-/// Appends the first table of another excitation at a share of its level.
-static int add_level(const struct variant *given, double level, struct variant *self, struct error *out_error)
+/// Appends a table of another excitation at a share of its level.
+static int add_level(const struct variant_table *from, double level, struct variant *self, struct error *out_error)
 {
     struct variant_table *table = &self->tables[self->table_count++];
-    *table = given->tables[0];
+    *table = *from;
     struct design_result *r = &table->result;
     size_t samples = r->period_samples * sizeof(double);
     r->bins = copied(r->bins, r->bin_count * sizeof *r->bins);
@@ -121,8 +122,39 @@ static int design_levels(const struct variant_basis *basis, const struct variant
 {
     count_periods(basis, given->tables[0].result.period_samples / basis->request->period_samples, given->periods, self);
     snprintf(self->says, sizeof self->says, "as given, and again at %.3g of the level", level);
-    int status = add_level(given, 1.0, self, out_error);
-    return status ? status : add_level(given, level, self, out_error);
+    int status = add_level(&given->tables[0], 1.0, self, out_error);
+    return status ? status : add_level(&given->tables[0], level, self, out_error);
+}
+
+static void measure_time(struct variant *self)
+{
+    self->test_time_s = 0.0;
+    for (size_t i = 0; i < self->table_count; i++)
+        self->test_time_s += (double)(self->tables[i].result.period_samples * (self->periods + self->settle_periods)) /
+                             rate_hz(&self->tables[i].request);
+}
+
+int variant_prolong(const struct variant *from, size_t times, struct variant *out_variant, struct error *out_error)
+{
+    *out_variant = (struct variant){
+        .kind = variant_longer, .periods = times * from->periods, .settle_periods = from->settle_periods};
+    snprintf(out_variant->says, sizeof out_variant->says, "%.120s, %zu times as long", from->says, times);
+    for (size_t i = 0; i < from->table_count; i++) {
+        const struct variant_table *table = &from->tables[i];
+        if (fabs(table->result.travel_per_period_rad) > 0.0 && table->request.limits.position_rad > 0.0) {
+            variant_free(out_variant);
+            snprintf(out_variant->why_not, sizeof out_variant->why_not,
+                     "a constant speed leaves the position limit after longer than the travel allows");
+            return 0;
+        }
+        int status = add_level(table, 1.0, out_variant, out_error);
+        if (status) {
+            variant_free(out_variant);
+            return status;
+        }
+    }
+    measure_time(out_variant);
+    return 0;
 }
 
 /// Every line at twice its frequency, if they stay well below half the rate: above, the hold between samples rules.
@@ -245,7 +277,8 @@ static int design_kind(const struct variant_basis *basis, const struct variant *
             return design_given(basis, times * basis->periods, self, out_error); // goes further: designed anew
         count_periods(basis, given->tables[0].result.period_samples / basis->request->period_samples,
                       times * basis->periods, self);
-        return add_level(given, 1.0, self, out_error);
+        return add_level(&given->tables[0], 1.0, self, out_error);
+    case variant_longer:
     case variant_kinds:
         break;
     }
@@ -264,9 +297,6 @@ int variant_design(const struct variant_basis *basis, enum variant_kind kind, co
                  why.message);
         return kind == variant_as_given ? error_set(out_error, status, "%s", why.message) : 0;
     }
-    for (size_t i = 0; i < out_variant->table_count; i++)
-        out_variant->test_time_s += (double)(out_variant->tables[i].result.period_samples *
-                                             (out_variant->periods + out_variant->settle_periods)) /
-                                    rate_hz(basis->request);
+    measure_time(out_variant);
     return 0;
 }

@@ -20,6 +20,7 @@ enum variant_kind {
     variant_slow_stroke,     ///< a slow travel under the multisine
     variant_both_directions, ///< at a constant speed, and at the same one backward
     variant_more_periods,    ///< four times as many
+    variant_longer,          ///< one of the others, for longer: variant_prolong()
     variant_kinds,
 };
 
@@ -51,16 +52,22 @@ struct variant {
 /// Name in the JSON and in messages: "slow_stroke".
 const char *variant_kind_str(enum variant_kind kind);
 
-/// Designs one excitation. `given` is the one as given, of which levels and speeds are taken; NULL for itself.
+/// Designs one excitation, any but variant_longer. `given` is the one as given, of which levels and speeds are taken;
+/// NULL for itself.
 /// Equation:  stroke: amplitude 0.6 turns or what the position limit leaves (at least 0.7 of it), periods P so that
 ///            2 pi A / (P T) is at most a quarter of the velocity limit (of the multisine's peak without one)
 ///            speed: V = half the velocity limit, or 1.2 times the multisine's peak without one: it never reverses; a
 ///            position limit gives half its room to the travel
-/// Errors:    what design_run() says of an excitation as given; memory is short. Others that the limits forbid are none:
+/// Errors:    of an excitation as given: what design_run() says, memory. Any other that cannot be designed is no error:
 ///            table_count is 0 then and why_not says what is in the way
 /// Test:      tests/unit/test_separation.c
 int variant_design(const struct variant_basis *basis, enum variant_kind kind, const struct variant *given,
                    struct variant *out_variant, struct error *out_error);
+
+/// Another variant with `times` as many counted periods.
+/// Errors: error_refused if memory is short. Where a constant speed would leave the position limit, table_count is 0
+///         and why_not says so
+int variant_prolong(const struct variant *from, size_t times, struct variant *out_variant, struct error *out_error);
 
 void variant_free(struct variant *self);
 

@@ -46,6 +46,19 @@
 #error "SERVOSCOPE_FRF_BLOCK: 8 .. 1024 samples"
 #endif
 
+/// Whether the block DFT uses the kernel of cores with ARMv7E-M's rounding high multiplies (Cortex-M4, M7), or portable
+/// C with the same results. Off by itself where the core or the compiler is another one.
+#ifndef SERVOSCOPE_FRF_ARMV7EM
+#if defined(__ARM_ARCH_7EM__) && defined(__GNUC__)
+#define SERVOSCOPE_FRF_ARMV7EM 1
+#else
+#define SERVOSCOPE_FRF_ARMV7EM 0
+#endif
+#endif
+#if SERVOSCOPE_FRF_ARMV7EM != 0 && SERVOSCOPE_FRF_ARMV7EM != 1
+#error "SERVOSCOPE_FRF_ARMV7EM: 0 or 1"
+#endif
+
 /// Width of the floating-point type of everything outside the sample path (period statistics, FRF, the guard in SI
 /// units): 64 is double, 32 is float for parts with a single-precision FPU.
 #ifndef SERVOSCOPE_REAL_BITS

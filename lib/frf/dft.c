@@ -9,17 +9,17 @@ CORE_STATIC_ASSERT(SERVOSCOPE_FRF_PERIOD_MAX <= 65536, index_fits_16_bits);
 /* k * n < 2^15 * 2^16 in frf_dft_skip() */
 CORE_STATIC_ASSERT(SERVOSCOPE_FRF_PERIOD_MAX / 2 <= 0xFFFFFFFFu / SERVOSCOPE_FRF_PERIOD_MAX, product_fits_32_bits);
 
-static enum core_status check_bins(const struct frf_dft_config *config, uint32_t period)
+enum core_status frf_check_bins(const uint32_t *bins, uint32_t bin_count, uint32_t period)
 {
-    if (config->bin_count < 1 || config->bin_count > SERVOSCOPE_FRF_BINS_MAX) {
+    if (bin_count < 1 || bin_count > SERVOSCOPE_FRF_BINS_MAX) {
         return core_err_frf_bins;
     }
     uint32_t previous = 0;
-    for (uint32_t b = 0; b < config->bin_count; ++b) {
-        if (config->bins[b] <= previous || config->bins[b] > (period - 1u) / 2u) {
+    for (uint32_t b = 0; b < bin_count; ++b) {
+        if (bins[b] <= previous || bins[b] > (period - 1u) / 2u) {
             return core_err_frf_bins;
         }
-        previous = config->bins[b];
+        previous = bins[b];
     }
     return core_ok;
 }
@@ -35,7 +35,7 @@ static enum core_status check_config(const struct frf_dft_config *config, uint32
     if (config->channels < 1 || config->channels > SERVOSCOPE_FRF_CHANNELS_MAX) {
         return core_err_frf_channels;
     }
-    enum core_status status = check_bins(config, period);
+    enum core_status status = frf_check_bins(config->bins, config->bin_count, period);
     if (status != core_ok) {
         return status;
     }

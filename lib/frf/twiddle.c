@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Needs math.h; firmware whose tables are in flash leaves this file out. */
-#include "frf/twiddle.h"
+#include "frf/kernel.h"
 
 #include <math.h>
 #include <stddef.h>
 
-/* An angle in units of an eighth of a sample, so that octants of any period are whole numbers: a circle is 8 N. */
-static double sine_of_eighths(uint32_t eighths, uint32_t period)
+double frf_sine_of_eighths(uint32_t eighths, uint32_t period)
 {
     static const double two_pi = 6.28318530717958647692;
     double sign = 1.0;
@@ -27,10 +26,10 @@ static double sine_of_eighths(uint32_t eighths, uint32_t period)
 static double entry_of(uint32_t index, uint32_t period)
 {
     if (index < period) {
-        return sine_of_eighths(8u * index, period);
+        return frf_sine_of_eighths(8u * index, period);
     }
     uint32_t eighths = 8u * (index - period) + (period % 4u == 0u ? 0u : 2u * period);
-    return sine_of_eighths(eighths >= 8u * period ? eighths - 8u * period : eighths, period);
+    return frf_sine_of_eighths(eighths >= 8u * period ? eighths - 8u * period : eighths, period);
 }
 
 static uint32_t cosine_offset(uint32_t period)

@@ -15,7 +15,8 @@ limits=(--inertia 0.001 --limit-torque 1 --limit-velocity 30)
 for r in 1 2 3; do
     "$SERVOSCOPE" design --rate 2000 --period 2000 --lines linear:2:400:4 --method random --seed "$r" "${limits[@]}" \
         --out "t$r" --quiet
-    "$SERVOSCOPE" simulate --model m.json --table "t$r.mst" --periods 6 --out "run$r.csv" --quiet
+    sed "s/\"seed\": 3/\"seed\": $r/" m.json >"m$r.json" # noise of its own
+    "$SERVOSCOPE" simulate --model "m$r.json" --table "t$r.mst" --periods 6 --out "run$r.csv" --quiet
 done
 "$SERVOSCOPE" design --rate 2000 --period 2000 --lines octaves:4:256:4 "${limits[@]}" --out seq --quiet
 "$SERVOSCOPE" simulate --model m.json --table seq.json --periods 4 --out seqrun.json --quiet

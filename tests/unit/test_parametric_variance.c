@@ -142,6 +142,23 @@ static void test_parametric_weights_take_output_and_input_together_in_a_loop(voi
     }
 }
 
+/// Of two realisations, whose noise differs from line to line, but not what they differ by beyond it.
+static void test_parametric_weights_of_few_runs_are_pooled_in_units_of_their_noise(void)
+{
+    fill(1, 1, 1.0);
+    for (size_t k = 0; k < lines; k++) {
+        double noise = k % 2 ? 50.0 : 1.0;
+        noise_share[k] = 1.0 / output_variance[k];
+        output_variance[k] *= noise;
+    }
+    TEST_ASSERT_EQUAL_size_t(21, parametric_weights_pool(&weights, &data));
+    for (size_t k = 0; k < lines; k++) {
+        double noise = k % 2 ? 50.0 : 1.0;
+        TEST_ASSERT_DOUBLE_WITHIN(largest_error, 0.0, log(output_variance[k] / (3.0 * noise * exp(0.01 * (double)k))));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9 * noise, fmin(noise, output_variance[k]), noise_share[k] * output_variance[k]);
+    }
+}
+
 /// What a model misses by more than the noise becomes variance, and the noise keeps its share of it.
 static void test_parametric_distortion_is_what_the_residual_has_beyond_noise(void)
 {
@@ -179,6 +196,7 @@ int main(void)
     RUN_TEST(test_parametric_weights_stay_where_pooling_gains_nothing);
     RUN_TEST(test_parametric_weights_look_at_the_input_where_it_matters);
     RUN_TEST(test_parametric_weights_take_output_and_input_together_in_a_loop);
+    RUN_TEST(test_parametric_weights_of_few_runs_are_pooled_in_units_of_their_noise);
     RUN_TEST(test_parametric_distortion_is_what_the_residual_has_beyond_noise);
     return UNITY_END();
 }

@@ -380,10 +380,23 @@ const struct command command_cmd_design = {
             "  --settle-time S      for settling (default one period)\n"
             "  --predict MODEL.json expected standard deviation of the response, with the model's noise\n"
             "\n"
-            "  --report FILE.html   a page: the period against its limits, the spectrum, the figures\n"
-            "\n"
-            "example, the belt drive of the first paper:\n"
-            "  servoscope design --rate 1000 --period 2000 --lines linear:0.5:100:0.5 --limit-torque 1 \\\n"
-            "      --inertia 0.00516 --limit-velocity-m-per-s 0.05 --pulley-radius 0.0159 --out belt\n",
+            "  --report FILE.html   a page: the period against its limits, the spectrum, the figures\n",
+    .more_help =
+        "\n"
+        "Telling two causes apart that a diagnosis could not:\n"
+        "  --separate A,B       cause ids, as in diagnose: tries the excitation as given, other levels, higher lines,\n"
+        "                       a slow stroke, constant speed both ways and more periods on the simulated drive, with\n"
+        "                       A and with B, and writes the cheapest one that separates them (PREFIX, or PREFIX-1\n"
+        "                       and PREFIX-2 if it takes two tables); nothing where none does\n"
+        "  --model MODEL.json   the drive: what diagnose was given, or the model it wrote; sizes of A and B are its\n"
+        "                       effects', or such that the excitation as given shows them clearly\n"
+        "  --nats N             log likelihood by which the wrong one has to lose (default 20; 6 is a tie)\n"
+        "\n"
+        "example, the belt drive of the first paper:\n"
+        "  servoscope design --rate 1000 --period 2000 --lines linear:0.5:100:0.5 --limit-torque 1 \\\n"
+        "      --inertia 0.00516 --limit-velocity-m-per-s 0.05 --pulley-radius 0.0159 --out belt\n"
+        "the same drive, after a diagnosis that ended in a tie:\n"
+        "  servoscope design --rate 1000 --period 2000 --lines odd:0.5:60:1 --limit-torque 1 --limit-velocity 15 \\\n"
+        "      --inertia 0.00516 --separate load_bias,asymmetric_friction --model m.json --out apart\n",
     .run = run,
 };

@@ -15,9 +15,10 @@ struct command_context {
 };
 
 struct command {
-    const char *name;    ///< as typed
-    const char *summary; ///< one line for the list
-    const char *help;    ///< whole text of --help, with an example
+    const char *name;      ///< as typed
+    const char *summary;   ///< one line for the list
+    const char *help;      ///< whole text of --help, with an example
+    const char *more_help; ///< printed after it where one literal (4095 characters in C99) is too short; NULL: none
     /// Does the work. argv[0] is the subcommand's name; --help, --json and --quiet are taken out before.
     /// Returns the exit status; on a non-zero one *out_error says why (printed by main).
     int (*run)(int argc, char **argv, const struct command_context *context, struct error *out_error);

@@ -73,6 +73,7 @@ static int run_command(const struct command *command, int argc, char **argv)
     argc = take_shared_options(argc, argv, &context, &help);
     if (help) {
         fputs(command->help, stdout);
+        fputs(command->more_help ? command->more_help : "", stdout);
         return finish_output(command->name, 0);
     }
     int status = command->run(argc, argv, &context, &error);

@@ -264,10 +264,10 @@ static void print_candidates(const struct separation *separation)
         const struct separation_candidate *c = &separation->candidates[i];
         const char *name = variant_kind_str(c->excitation.kind);
         if (c->measured)
-            printf("%c %-16s %8.3g %7.4g s  %s\n", (int)i == separation->chosen ? '*' : ' ', name, c->nats,
+            printf("%c %-16s %8.1f %7.4g s  %s\n", (int)i == separation->chosen ? '*' : ' ', name, c->nats,
                    c->excitation.test_time_s, c->excitation.says);
         else
-            printf("  %-16s %8s %9s  not possible: %s\n", name, "-", "-", c->excitation.why_not);
+            printf("  %-16s %8s %9s  %s\n", name, "-", "-", c->excitation.why_not);
     }
 }
 
@@ -276,13 +276,13 @@ static void print_chosen(const struct separating *self, const struct separation 
     const struct separation_candidate *c = &separation->candidates[separation->chosen];
     const struct variant *excitation = &c->excitation;
     char text[1024];
-    printf("\n%s: %s; expected to separate them by %.3g nats", variant_kind_str(excitation->kind), excitation->says,
+    printf("\n%s: %s; expected to separate them by %.1f nats", variant_kind_str(excitation->kind), excitation->says,
            c->nats);
     if (!separation->enough)
         printf(", less than the %.3g asked for, and none does better", self->options->nats);
     printf(".\nSimulated again with fresh noise:");
     for (size_t i = 0; i < separation->checked; i++)
-        printf("%s %.3g", i > 0 ? "," : "", separation->checked_nats[i]);
+        printf("%s %.1f", i > 0 ? "," : "", separation->checked_nats[i]);
     printf(" nats (a tie is below %.3g).\n", separation_tie_nats);
     for (size_t i = 0; i < excitation->table_count; i++) {
         say_measure(self, excitation, i, text, sizeof text);

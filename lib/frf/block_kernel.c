@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: MIT */
+#include "frf/block_kernel.h"
+
+/* Sums are kept unsigned: they are modulo 2^32 by definition, and only the last has to be in range. */
+static inline uint32_t high_word(int64_t product)
+{
+    return (uint32_t)(((uint64_t)product + 0x80000000u) >> 32);
+}
+
+/* The conversion of an unsigned value above the signed maximum is implementation-defined in C99, hence the detour. */
+static inline int32_t as_signed(uint32_t value)
+{
+    return value < 0x80000000u ? (int32_t)value : (int32_t)(value - 0x80000000u) + INT32_MIN;
+}
+
+static inline uint32_t add_product(uint32_t sum, int32_t a, int32_t b)
+{
+    return sum + high_word((int64_t)a * b);
+}
+
+/* sum * 2^32 - product, rounded: minus a product is not the rounded product subtracted where that is a half */
+static inline uint32_t subtract_product(uint32_t sum, int32_t a, int32_t b)
+{
+    return sum + high_word(-((int64_t)a * b));
+}
+
+static void accumulate_row(int32_t *accumulator, const int32_t *rotation, const int32_t *factors, const int32_t *data,
+                           uint32_t groups)
+{
+    int32_t cosine = rotation[0], sine = rotation[1];
+    uint32_t real = add_product(0, accumulator[0], cosine), imaginary = add_product(0, accumulator[0], sine);
+    real = 2u * subtract_product(real, accumulator[1], sine);
+    imaginary = 2u * add_product(imaginary, accumulator[1], cosine);
+    for (uint32_t g = 0; g < groups; ++g) {
+        real = add_product(real, data[4u * g], factors[8u * g]);
+        imaginary = add_product(imaginary, data[4u * g + 1u], factors[8u * g + 1u]);
+        real = add_product(real, data[4u * g + 2u], factors[8u * g + 2u]);
+        imaginary = add_product(imaginary, data[4u * g + 3u], factors[8u * g + 3u]);
+    }
+    accumulator[0] = as_signed(real);
+    accumulator[1] = as_signed(imaginary);
+}
+
+void frf_block_accumulate_portable(int32_t *accumulators, const int32_t *rows, const int32_t *data, uint32_t row_pairs,
+                                   uint32_t groups)
+{
+    for (uint32_t p = 0; p < row_pairs; ++p) {
+        const int32_t *row = rows + p * (4u + 8u * groups);
+        accumulate_row(accumulators + 4u * p, row, row + 4, data, groups);
+        accumulate_row(accumulators + 4u * p + 2u, row + 2, row + 8, data, groups);
+    }
+}
