@@ -99,6 +99,7 @@ struct sim_coverage {
     double torque_peak;
     double reference_peak; ///< of the torque asked for; 0: not recorded
     double position_mean;
+    double steadiness; ///< correlation of position with time, 0..1: 1 at constant speed
     double duration_s;
     double frequency_max_hz; ///< highest excited line
     size_t tone_count;

@@ -29,9 +29,21 @@ static bool disturbance_scan(const struct sim_model *model, const struct sim_cov
     return index < (coverage->tone_count > 0 ? coverage->tone_count : 1);
 }
 
+/// At constant speed what repeats in time repeats with the position.
+static bool disturbance_blind(const struct sim_coverage *coverage, char *out_why, size_t size)
+{
+    const double constant = 0.999;
+    if (!(coverage->steadiness > constant))
+        return false;
+    snprintf(out_why, size, "the axis moved at constant speed: what repeats in time repeats with the position as well");
+    return true;
+}
+
 static bool disturbance_testable(const double *p, const struct sim_coverage *coverage, char *out_why, size_t size)
 {
     const double fewest = 2.0;
+    if (disturbance_blind(coverage, out_why, size))
+        return false;
     double periods = p[2] * coverage->duration_s;
     if (periods >= fewest)
         return true;
@@ -80,6 +92,7 @@ const struct sim_effect sim_effect_periodic_disturbance = {
     .oppose = disturbance_oppose,
     .scan = disturbance_scan,
     .testable = disturbance_testable,
-    .measure = "the torque at standstill or at constant speed for a minute",
+    .blind = disturbance_blind,
+    .measure = "the torque at standstill, or at two constant speeds for a minute each",
     .say = disturbance_say,
 };

@@ -14,7 +14,7 @@
 #include <string.h>
 
 enum {
-    leading_numbers = 1 << 21,
+    leading_numbers = 1 << 19,
     whole_numbers = 1 << 27,
     leading_periods = 4,
     piece_rows = 65536,
