@@ -10,6 +10,7 @@
 enum {
     speed_knots = 7,     // per direction
     position_knots = 11, // over the covered span
+    balance_knots = 127, // where torque is held against the position: ripple of 60 periods over the span
     direction_knots = 5,
     filter_taps = 6,
 };
@@ -73,6 +74,8 @@ static void filter_function(const struct recording *r, size_t n, size_t index, d
     const double *u = driving_signal(r);
     double torque = u[n], scale = 1.0 / r->coverage.torque_rms;
     *out_mechanics = *out_actuator = 0.0;
+    if (r->block.still && index < group_sizes[blackbox_filter] - 1)
+        return; // what is to be explained is the torque itself
     if (index < filter_taps)
         *out_mechanics = u[back(r, n, index)];
     else if (index < 2 * filter_taps)
@@ -88,6 +91,7 @@ static void filter_function(const struct recording *r, size_t n, size_t index, d
 struct builder {
     const struct recording *r;
     double low;
+    size_t knots; ///< of functions of position
 };
 
 static void regressor(const struct builder *b, enum blackbox_group group, size_t index, size_t n, double *out_mechanics,
@@ -103,7 +107,7 @@ static void regressor(const struct builder *b, enum blackbox_group group, size_t
         *out_mechanics = speed_function(r, v, index);
         break;
     case blackbox_position:
-        *out_mechanics = position_function(r, b->low, x, index, position_knots);
+        *out_mechanics = position_function(r, b->low, x, index, b->knots);
         break;
     case blackbox_direction:
         *out_mechanics = (v > 0.0 ? 1.0 : -1.0) * position_function(r, b->low, x, index, direction_knots);
@@ -122,11 +126,13 @@ static bool build_run(const struct blackbox *self, const struct evidence *eviden
     double *signal = malloc(2 * samples * sizeof *signal);
     if (!signal)
         return false;
-    struct builder b = {.r = r, .low = r->block.position[0]};
+    struct builder b = {.r = r,
+                        .low = r->block.position[0],
+                        .knots = self->group_begin[blackbox_position + 1] - self->group_begin[blackbox_position]};
     for (size_t n = 0; n < samples; n++)
         b.low = fmin(b.low, r->block.position[n]);
     for (int group = 0; group < blackbox_groups; group++)
-        for (size_t i = 0; i < group_sizes[group]; i++) {
+        for (size_t i = 0; self->group_begin[group] + i < self->group_begin[group + 1]; i++) {
             for (size_t n = 0; n < samples; n++)
                 regressor(&b, (enum blackbox_group)group, i, n, &signal[n], &signal[samples + n]);
             evidence_whiten(evidence, signal, signal + samples,
@@ -139,8 +145,13 @@ static bool build_run(const struct blackbox *self, const struct evidence *eviden
 bool blackbox_init(struct blackbox *self, const struct fit_data *data)
 {
     memset(self, 0, sizeof *self);
-    for (int group = 0; group < blackbox_groups; group++)
-        self->group_begin[group + 1] = self->group_begin[group] + group_sizes[group];
+    bool still = data->runs > 0 && data->evidence[0].recording->block.still;
+    size_t knots = data->values / 6; // most of what there is has to stay noise
+    knots = knots > balance_knots ? balance_knots : knots < position_knots ? position_knots : knots;
+    for (int group = 0; group < blackbox_groups; group++) {
+        size_t size = still && group == blackbox_position ? knots : group_sizes[group];
+        self->group_begin[group + 1] = self->group_begin[group] + size;
+    }
     self->columns = self->group_begin[blackbox_groups];
     self->matrix = malloc(self->columns * data->values * sizeof(double));
     size_t offset = 0;

@@ -3,10 +3,12 @@
 
 #include "lab/diagnose/blackbox.h"
 #include "lab/diagnose/gain.h"
+#include "lab/diagnose/hold.h"
 #include "lab/diagnose/judge.h"
 #include "lab/diagnose/recording.h"
 #include "lab/diagnose/search.h"
 #include "lab/diagnose/validate.h"
+#include "lab/diagnose/wording.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -220,6 +222,45 @@ static int choose_model(const struct diagnosis_request *request, const struct re
     return 0;
 }
 
+static const char *input_name(const struct diagnosis *d)
+{
+    if (d->input_unit)
+        return strcmp(d->input_unit, "V") == 0 ? "voltage" : "current";
+    return d->linear ? "force" : "torque";
+}
+
+/// A torque without a reference may be the command itself, which acts from its row on: half a sample later than a
+/// measured one. Only where a rigid body with friction explains nearly all of it can that be told from a spring.
+static void choose_hold(struct work *w, struct diagnosis *d)
+{
+    const double nearly_all = 0.9, early = 0.25, late = 0.75, clearly = 3.0;
+    size_t held = 0, count = w->fit_count + w->validate_count;
+    struct hold first = {0};
+    for (size_t i = 0; i < w->fit_count; i++) {
+        struct hold hold;
+        const struct recording *r = &w->recordings[i];
+        if (r->block.torque_ref || r->block.still || !hold_find(r, &hold) || !(hold.explained > nearly_all))
+            return;
+        held += hold.delay > early + clearly * hold.deviation && hold.delay < late;
+        first = i == 0 ? hold : first;
+    }
+    if (held < w->fit_count)
+        return;
+    for (size_t i = 0; i < count; i++)
+        w->recordings[i].all.held = w->recordings[i].block.held = true;
+    oddities_add(&d->oddities,
+                 "The %s acts %.2f samples later than straight lines between its rows say: it was taken as a "
+                 "command that holds from its row on.",
+                 input_name(d), first.delay);
+}
+
+/// Without a model and without acceleration torques are balanced instead of moving anything.
+static void choose_balance(struct work *w, const struct diagnosis *d)
+{
+    for (size_t i = 0; i < w->fit_count + w->validate_count; i++)
+        w->recordings[i].all.still = w->recordings[i].block.still = !d->model_given && !d->inertia_seen;
+}
+
 static void scale_input(struct work *w, struct diagnosis *d, double factor)
 {
     for (size_t i = 0; i < w->fit_count + w->validate_count; i++)
@@ -261,6 +302,8 @@ static int look_at_oddities(const struct diagnosis_request *request, const struc
                             struct error *out_error)
 {
     for (size_t i = 0; i < w->fit_count + w->validate_count; i++) {
+        if (d->held_back && i == w->fit_count)
+            continue; // of the same run as the first
         const struct oddities *odd = &w->recordings[i].oddities;
         for (size_t j = 0; j < odd->count; j++)
             oddities_add(&d->oddities, "%s", odd->texts[j]);
@@ -381,6 +424,16 @@ static bool same_names(const struct hypothesis *a, const struct hypothesis *b)
     return memcmp(a->named, b->named, sizeof a->named) == 0;
 }
 
+/// Estimates the noise under a model, fits the hypothesis with it, and says what model that makes.
+static bool fit_anew(struct work *w, struct hypothesis *h, struct sim_model *io_model)
+{
+    if (!estimate_fit_noise(w, io_model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
+        !fit_run(&w->fit, &w->fit_data, h, refit_iterations))
+        return false;
+    hypothesis_model(h, NULL, io_model);
+    return true;
+}
+
 /// Refits the given structure, and with it a free gain.
 static bool refit_given(struct work *w, struct diagnosis *d, struct hypothesis *h, struct sim_model *out_model)
 {
@@ -390,12 +443,8 @@ static bool refit_given(struct work *w, struct diagnosis *d, struct hypothesis *
     *out_model = d->given;
     for (size_t pass = 0; pass < passes && more; pass++) {
         double step = 0.0;
-        if (!estimate_fit_noise(w, out_model) ||
-            !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
-            !fit_run(&w->fit, &w->fit_data, h, refit_iterations) ||
-            (pass + 1 < passes && !refine_gain(w, d, h, &step)))
+        if (!fit_anew(w, h, out_model) || (pass + 1 < passes && !refine_gain(w, d, h, &step)))
             return false;
-        hypothesis_model(h, NULL, out_model);
         more = !h->gain_free || fabs(step) > settled;
     }
     return true;
@@ -417,7 +466,8 @@ static bool find_causes(const struct diagnosis_request *request, struct work *w,
     struct search_options options = {.causes_max = 6, .progress = request->progress, .user = request->user};
     for (int pass = 0; pass < 4; pass++) {
         struct hypothesis before = *h;
-        if ((pass > 0 && !refine_gain(w, d, h, &step)) || !estimate_fit_noise(w, &model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
+        if ((pass > 0 && !refine_gain(w, d, h, &step)) || !estimate_fit_noise(w, &model) ||
+            !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
             !search_run(&w->fit_data, &w->recordings[0].coverage, &options, h, &w->fit))
             return false;
         hypothesis_model(h, NULL, &model);
@@ -425,12 +475,9 @@ static bool find_causes(const struct diagnosis_request *request, struct work *w,
             break;
     }
     // Effects in time are linear about the model that the noise was estimated with: once more, from where they are now.
-    for (int pass = 0; contrast_concerns(&model) && pass < 2; pass++) {
-        if (!estimate_fit_noise(w, &model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
-            !fit_run(&w->fit, &w->fit_data, h, refit_iterations))
+    for (int pass = 0; contrast_concerns(&model) && pass < 2; pass++)
+        if (!fit_anew(w, h, &model))
             return false;
-        hypothesis_model(h, NULL, &model);
-    }
     d->extended_model = model;
     d->fit_misfit = w->fit.cost / (double)w->fit_data.values;
     return true;
@@ -476,6 +523,7 @@ static void describe_cause(const struct work *w, const struct diagnosis *d, cons
         out->deviations[i] *= misfit;
     struct sim_finding finding = {out->values, out->deviations, out->nominal, d->linear};
     e->say(&finding, out->says, sizeof out->says);
+    wording_in_units(d, sizeof out->says, out->says);
 }
 
 static int stronger(const void *a, const void *b)
@@ -501,6 +549,13 @@ static void list_causes(const struct work *w, struct diagnosis *d, const struct 
     qsort(d->candidates, d->candidate_count, sizeof d->candidates[0], stronger);
 }
 
+/// Whether an effect shows only where something accelerates: masses and what is between them.
+static bool takes_acceleration(const struct sim_effect *e)
+{
+    return e->place == sim_place_load || e->engage ||
+           e->parameters[0].model_offset == offsetof(struct sim_model, load_inertia_kgm2);
+}
+
 /// What was not asked of the data because the data cannot answer.
 static void list_untestable(const struct work *w, struct diagnosis *d, const struct hypothesis *h)
 {
@@ -511,7 +566,9 @@ static void list_untestable(const struct work *w, struct diagnosis *d, const str
         if (h->named[e] || sim_effects[e]->notice)
             continue;
         if (sim_effects[e]->place == sim_place_actuator && !h->actuator_seen)
-            snprintf(u->why, sizeof u->why, "no torque reference was recorded beside the torque");
+            snprintf(u->why, sizeof u->why, "no %s reference was recorded beside the %s", input_name(d), input_name(d));
+        else if (w->recordings[0].block.still && takes_acceleration(sim_effects[e]))
+            snprintf(u->why, sizeof u->why, "nothing accelerates");
         else if (!sim_effects[e]->blind || !sim_effects[e]->blind(coverage, u->why, sizeof u->why))
             continue;
         d->untestable_count++;
@@ -571,6 +628,21 @@ static void list_gain_ties(struct diagnosis *d)
                      d->input_unit, d->input_unit, d->input_gain, d->input_gain_deviation, d->linear ? "N" : "Nm");
 }
 
+/// Without periods the noise is what a smooth black box leaves of the residual, and what that cannot follow passes for
+/// noise. The spectrum above the excitation is a second opinion: an error far above it is not explained.
+static void refuse_distance(const struct work *w, const struct diagnosis *d, struct judgement *io_judgement)
+{
+    const double far = 4.0, large = 0.1;
+    double error = d->extended.validation_nrmse;
+    if (io_judgement->unexplained || w->recordings[w->fit_count].periodic || !(error > large) ||
+        !(error > far * d->noise_floor_nrmse))
+        return;
+    io_judgement->unexplained = true;
+    snprintf(io_judgement->where, sizeof io_judgement->where,
+             "on unseen data the error is %.2g times what the noise above the excited band would make",
+             error / d->noise_floor_nrmse);
+}
+
 static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesis *h)
 {
     // The noise of the validation data under the extended model; one set of weights for all three models.
@@ -584,10 +656,15 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     struct judgement judgement;
     // An effect that cannot show in the validation data changes nothing there; one that spoils it is a wrong name.
     const double clearly = 1.2;
-    bool worse = d->extended.validation_nrmse > clearly * d->refitted.validation_nrmse &&
-                 d->extended.validation_nrmse > clearly * d->noise_floor_nrmse;
-    if (!judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, d->extended.whitened_rms, worse, &judgement))
+    struct judge_validation seen = {
+        .whitened_rms = d->extended.whitened_rms,
+        .worse = d->extended.validation_nrmse > clearly * d->refitted.validation_nrmse &&
+                 d->extended.validation_nrmse > clearly * d->noise_floor_nrmse,
+    };
+    if (!judge_structure(&w->validate_data, &d->extended_model, &seen.over_time) ||
+        !judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, &seen, &judgement))
         return false;
+    refuse_distance(w, d, &judgement);
     d->verdict = judgement.unexplained                                         ? diagnosis_unexplained
                  : judgement.count > 0 || w->recordings[0].finding.effect >= 0 ? diagnosis_explained
                                                                                : diagnosis_no_discrepancy;
@@ -620,6 +697,10 @@ int diagnosis_run(const struct diagnosis_request *request, struct diagnosis *out
         status = choose_model(request, &w.recordings[0], d, out_error);
     if (status == 0)
         choose_gain(&w, d);
+    if (status == 0)
+        choose_balance(&w, d);
+    if (status == 0)
+        choose_hold(&w, d);
     if (status == 0)
         status = look_at_oddities(request, &w, d, out_error);
     if (status == 0)

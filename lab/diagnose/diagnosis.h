@@ -63,7 +63,7 @@ struct diagnosis_curves {
 
 struct diagnosis {
     enum diagnosis_verdict verdict;
-    bool inertia_seen; ///< without a model: the recordings say what the inertia is
+    bool inertia_seen;                   ///< without a model: the recordings say what the inertia is
     bool linear, model_given, held_back; ///< held_back: validated on the last part of the only run
     char runs[512], motion_from[280];    ///< what was fitted; one sentence on the filtering
     const char *input_unit;              ///< "A", "V", or NULL: a torque or a force

@@ -4,6 +4,7 @@
 
 #include <cjson/cJSON.h>
 #include <math.h>
+#include <stdlib.h>
 
 /// A number, or null where there is none: JSON has no NaN.
 static bool add_number(cJSON *object, const char *name, double value)
@@ -116,8 +117,23 @@ static bool add_gain(cJSON *root, const struct diagnosis *self)
         return true;
     }
     cJSON *object = cJSON_AddObjectToObject(root, "input_gain");
-    return object && add_text(object, "input_unit", self->input_unit) && add_number(object, "value", self->input_gain) &&
-           add_number(object, "std", self->input_gain_deviation);
+    return object && add_text(object, "input_unit", self->input_unit) &&
+           add_number(object, "value", self->input_gain) && add_number(object, "std", self->input_gain_deviation);
+}
+
+static bool add_next(cJSON *root, const struct diagnosis *self)
+{
+    enum { sentences_max = 24 };
+    cJSON *array = cJSON_AddArrayToObject(root, "next");
+    char(*sentences)[wording_size] = malloc(sentences_max * sizeof *sentences);
+    bool ok = array && sentences;
+    size_t count = ok ? wording_next(self, sentences_max, sentences) : 0;
+    for (size_t i = 0; ok && i < count; i++) {
+        cJSON *text = cJSON_CreateString(sentences[i]);
+        ok = text && cJSON_AddItemToArray(array, text);
+    }
+    free(sentences);
+    return ok;
 }
 
 /// What a reader of the file alone would miss: the verdict as a sentence, and what it rests on.
@@ -127,7 +143,7 @@ static bool add_context(cJSON *root, const struct diagnosis *self)
     wording_headline(self, headline);
     wording_gain(self, gain);
     return add_text(root, "headline", headline) && add_text(root, "gain", gain) && add_text(root, "runs", self->runs) &&
-           add_text(root, "motion_from", self->motion_from) && add_notes(root, self) &&
+           add_text(root, "motion_from", self->motion_from) && add_notes(root, self) && add_next(root, self) &&
            cJSON_AddBoolToObject(root, "linear", self->linear) &&
            cJSON_AddBoolToObject(root, "model_given", self->model_given) &&
            cJSON_AddBoolToObject(root, "held_back", self->held_back) &&

@@ -4,6 +4,7 @@
 #include "lab/numeric/least_squares.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -109,10 +110,53 @@ static void differentiate_by(const struct fit *self, const struct fit_data *data
         out_column[j] = (out_column[j] - self->residual[j]) / step;
 }
 
-static void differentiate(struct fit *self, const struct fit_data *data, const struct hypothesis *h)
+/// Index of the same coordinate in another hypothesis, or its count.
+static size_t find_coordinate(const struct hypothesis *h, const struct coordinate *c)
 {
-    for (size_t i = 0; i < h->count; i++)
-        differentiate_by(self, data, h, i, self->jacobian + i * self->rows);
+    for (size_t i = 0; i < h->count; i++) {
+        const struct coordinate *d = &h->coordinates[i];
+        if (d->effect == c->effect && d->parameter == c->parameter && d->model_offset == c->model_offset &&
+            d->unit == c->unit)
+            return i;
+    }
+    return h->count;
+}
+
+/// A column of another fit's Jacobian; if that had no effect in time, the contrasts do not depend on its coordinates
+/// but through the effect in time itself, which is small as long as it is new.
+static void take_column(const struct fit *from, size_t i, size_t rows, double *out_column)
+{
+    size_t shared = from->rows < rows ? from->rows : rows;
+    memcpy(out_column, from->jacobian + i * from->rows, shared * sizeof *out_column);
+    memset(out_column + shared, 0, (rows - shared) * sizeof *out_column);
+}
+
+/// Whose derivatives may be taken over, if anybody's.
+struct lender {
+    const struct hypothesis *hypothesis; ///< NULL: nobody
+    const struct fit *fit;
+};
+
+/// A number of the given model that may be off by a few percent only: it hardly moves, and what else the model has
+/// hardly changes what it does.
+static bool is_nearly_known(const struct coordinate *c)
+{
+    const double narrow = 0.25;
+    return c->effect < 0 && c->scale == coordinate_logarithmic && c->weight > 0.0 && c->upper - c->lower < narrow;
+}
+
+static void differentiate(struct fit *self, const struct fit_data *data, const struct hypothesis *h,
+                          const struct lender *lender)
+{
+    for (size_t i = 0; i < h->count; i++) {
+        const struct coordinate *c = &h->coordinates[i];
+        double *column = self->jacobian + i * self->rows;
+        size_t j = lender->hypothesis && is_nearly_known(c) ? find_coordinate(lender->hypothesis, c) : SIZE_MAX;
+        if (lender->hypothesis && j < lender->hypothesis->count)
+            take_column(lender->fit, j, self->rows, column);
+        else
+            differentiate_by(self, data, h, i, column);
+    }
 }
 
 void fit_linear(const struct fit *self, const struct fit_data *data, const struct hypothesis *hypothesis, double *out_A,
@@ -206,7 +250,8 @@ static bool take_step(struct fit *self, const struct fit_data *data, struct hypo
 }
 
 /// Up to `iterations` steps; `finish`: derivatives and covariance at the x where it ends.
-static bool improve(struct fit *self, const struct fit_data *data, struct hypothesis *h, size_t iterations, bool finish)
+static bool improve(struct fit *self, const struct fit_data *data, struct hypothesis *h, const struct lender *lender,
+                    size_t iterations, bool finish)
 {
     size_t rows = data->values + data->contrasts;
     double *work = malloc((rows * h->count + 2 * rows) * sizeof *work);
@@ -218,7 +263,7 @@ static bool improve(struct fit *self, const struct fit_data *data, struct hypoth
     self->cost = residual_at(data, h, h->x, self->residual, &self->rows);
     for (size_t i = 0; i < iterations && good && more; i++) {
         if (!fresh)
-            differentiate(self, data, h);
+            differentiate(self, data, h, lender);
         fresh = true;
         good = solve_step(self, h, damping, work, x, self->covariance);
         bool taken = false;
@@ -227,7 +272,7 @@ static bool improve(struct fit *self, const struct fit_data *data, struct hypoth
     }
     if (good && finish) {
         if (!fresh)
-            differentiate(self, data, h);
+            differentiate(self, data, h, lender);
         good = solve_step(self, h, 0.0, work, x, self->covariance);
     }
     self->prior = prior_cost(h, h->x);
@@ -237,33 +282,15 @@ static bool improve(struct fit *self, const struct fit_data *data, struct hypoth
 
 bool fit_run(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis, size_t iterations)
 {
-    return improve(self, data, io_hypothesis, iterations, true);
+    return improve(self, data, io_hypothesis, &(struct lender){0}, iterations, true);
 }
 
-bool fit_roughly(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis, size_t iterations)
+bool fit_roughly(struct fit *self, const struct fit_data *data, const struct hypothesis *base,
+                 const struct fit *base_fit, struct hypothesis *io_hypothesis, size_t iterations)
 {
-    return improve(self, data, io_hypothesis, iterations, false);
-}
-
-/// Index of the same coordinate in another hypothesis, or its count.
-static size_t find_coordinate(const struct hypothesis *h, const struct coordinate *c)
-{
-    for (size_t i = 0; i < h->count; i++) {
-        const struct coordinate *d = &h->coordinates[i];
-        if (d->effect == c->effect && d->parameter == c->parameter && d->model_offset == c->model_offset &&
-            d->unit == c->unit)
-            return i;
-    }
-    return h->count;
-}
-
-/// A column of another fit's Jacobian; if that had no effect in time, the contrasts do not depend on its coordinates
-/// but through the effect in time itself, which is small as long as it is new.
-static void take_column(const struct fit *from, size_t i, size_t rows, double *out_column)
-{
-    size_t shared = from->rows < rows ? from->rows : rows;
-    memcpy(out_column, from->jacobian + i * from->rows, shared * sizeof *out_column);
-    memset(out_column + shared, 0, (rows - shared) * sizeof *out_column);
+    bool alike = base && base->engaged.structure == io_hypothesis->engaged.structure;
+    struct lender lender = {alike ? base : NULL, base_fit};
+    return improve(self, data, io_hypothesis, &lender, iterations, false);
 }
 
 bool fit_step(struct fit *self, const struct fit_data *data, const struct hypothesis *base, const struct fit *base_fit,

@@ -35,8 +35,11 @@ size_t fit_residual(const struct fit_data *data, const struct sim_model *model, 
 /// best so far.
 bool fit_run(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis, size_t iterations);
 
-/// The same without derivatives and covariance at the end: a look at what could be had.
-bool fit_roughly(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis, size_t iterations);
+/// The same without derivatives and covariance at the end: a look at what could be had. If `base` (NULL: nothing), which
+/// the hypothesis extends, has the same structure, derivatives by the given model's numbers, which move by a few percent
+/// at most, are taken from `base_fit`.
+bool fit_roughly(struct fit *self, const struct fit_data *data, const struct hypothesis *base,
+                 const struct fit *base_fit, struct hypothesis *io_hypothesis, size_t iterations);
 
 /// One step of a hypothesis that extends `base`: derivatives by the coordinates that both share are taken from
 /// `base_fit`, only those of the new ones are computed. Leaves cost and x of the better of start and step; no

@@ -43,38 +43,52 @@ void gain_scale(struct recording *io_recording, double factor)
     c->reference_peak *= fabs(factor);
 }
 
-/// Derivative of the whitened residual over the gain, by the logarithm of the gain.
-static void differentiate(const struct fit_data *data, const struct sim_model *model, struct recording *recordings,
-                          double *work, double *out_column)
+/// Derivative of the whitened residual by the logarithm of the gain. What the actuator is off by is in units of the
+/// input, and so is its noise: only the mechanics tell the gain.
+static bool differentiate(const struct fit_data *data, const struct sim_model *model, struct recording *recordings,
+                          double *out_column)
 {
     const double step = 1e-3;
-    fit_residual(data, model, out_column);
-    for (size_t i = 0; i < data->runs; i++)
+    for (size_t i = 0; i < data->runs; i++) {
+        const struct evidence *e = &data->evidence[i];
+        size_t n = recordings[i].block.samples;
+        double *before = malloc(3 * n * sizeof *before);
+        if (!before)
+            return false;
+        double *after = before + n, *unused = after + n;
+        bool good = evidence_signals(e, model, before, unused);
         gain_scale(&recordings[i], 1.0 + step);
-    fit_residual(data, model, work);
-    for (size_t i = 0; i < data->runs; i++)
+        good = good && evidence_signals(e, model, after, unused);
         gain_scale(&recordings[i], 1.0 / (1.0 + step));
-    for (size_t j = 0; j < data->values; j++)
-        out_column[j] = (work[j] / (1.0 + step) - out_column[j]) / step;
+        for (size_t j = 0; j < n; j++)
+            after[j] = (after[j] - before[j]) / step;
+        if (good)
+            evidence_whiten(e, after, NULL, out_column);
+        free(before);
+        if (!good)
+            return false;
+        out_column += e->values;
+    }
+    return true;
 }
 
 bool gain_step(const struct fit_data *data, const struct fit *fit, const struct hypothesis *hypothesis,
                struct recording *recordings, double *out_step, double *out_deviation)
 {
-    size_t rows = data->values, m = hypothesis->count, all = rows + data->contrasts;
+    size_t rows = data->values, m = hypothesis->count;
     double weight[hypothesis_coordinates_max + 1] = {0}, centre[hypothesis_coordinates_max + 1] = {0};
     double x[hypothesis_coordinates_max + 1];
-    double *A = malloc((rows * m + all + rows + all) * sizeof *A), *covariance = malloc((m + 1) * (m + 1) * sizeof *A);
+    double *A = malloc((rows * (m + 2)) * sizeof *A), *covariance = malloc((m + 1) * (m + 1) * sizeof *A);
     bool good = A && covariance;
     if (good) {
-        double *column = A + rows * m, *b = column + all, *work = b + rows;
+        double *column = A + rows * m, *b = column + rows;
         struct sim_model model;
         hypothesis_model(hypothesis, NULL, &model);
         fit_linear(fit, data, hypothesis, A, weight, centre);
-        differentiate(data, &model, recordings, work, column);
         for (size_t j = 0; j < rows; j++)
             b[j] = -fit->residual[j];
-        good = least_squares_solve(rows, m + 1, A, b, weight, centre, x, covariance);
+        good = differentiate(data, &model, recordings, column) &&
+               least_squares_solve(rows, m + 1, A, b, weight, centre, x, covariance);
         *out_step = good ? x[m] : 0.0;
         *out_deviation = good ? sqrt(covariance[(m + 1) * (m + 1) - 1]) : 0.0;
     }

@@ -20,7 +20,8 @@ void gain_scale(struct recording *io_recording, double factor);
 
 /// One step towards the gain that fits best: how much larger its logarithm should be, beside all coordinates of the
 /// hypothesis that `fit` belongs to, and the standard deviation of that.
-/// Equation:  d(r / g) / d ln g, r the whitened residual: an input that is told too small must not pass for small noise
+/// Equation:  least squares of r + A y + (d r_m / d ln g) x, r the whitened residual, r_m its mechanics, A y the
+///            hypothesis' own coordinates with their priors
 /// Shapes:    recordings: data->runs, those of data->evidence; as they were on return
 /// Errors:    false if memory is short or the data cannot tell
 bool gain_step(const struct fit_data *data, const struct fit *fit, const struct hypothesis *hypothesis,

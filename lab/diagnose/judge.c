@@ -173,6 +173,28 @@ static bool look_over_time(const struct fit_data *data, const struct fit *fit, c
     return true;
 }
 
+bool judge_structure(const struct fit_data *data, const struct sim_model *model, struct structure *out_structure)
+{
+    double *residual = malloc((data->values + data->contrasts) * sizeof *residual);
+    memset(out_structure, 0, sizeof *out_structure);
+    if (!residual)
+        return false;
+    size_t rows = fit_residual(data, model, residual);
+    const double *contrasts = rows > data->values ? residual + data->values : NULL;
+    bool good = true;
+    for (size_t i = 0; i < data->runs && good; i++) {
+        const struct evidence *e = &data->evidence[i];
+        struct structure s;
+        good = structure_find(e, contrasts ? contrasts : e->contrast.base, &s);
+        if (good)
+            structure_merge(out_structure, &s);
+        if (contrasts)
+            contrasts += e->contrast.values;
+    }
+    free(residual);
+    return good;
+}
+
 /// What judging names needs.
 struct bench {
     const struct blackbox *box;
@@ -204,9 +226,9 @@ static bool judge_in_time(const struct bench *b, struct judgement *j)
     for (int e = 0; sim_effects[e]; e++) {
         if (!b->hypothesis->named[e] || !is_in_time(b, e))
             continue;
-        j->stands[e] =
-            is_large_enough(b, e) && (!(j->leftover_in_time > 0.0) || search_evidence(b->data, b->hypothesis, b->fit, e) >
-                                                                          dominance * j->leftover_in_time);
+        j->stands[e] = is_large_enough(b, e) &&
+                       (!(j->leftover_in_time > 0.0) ||
+                        search_evidence(b->data, b->hypothesis, b->fit, e) > dominance * j->leftover_in_time);
         all = all && j->stands[e];
     }
     return all;
@@ -218,8 +240,9 @@ static void judge_others(const struct bench *b, const struct structure *over_tim
     // How far a cause has to outweigh what stays unexplained. Beside a given model a name says what changed, and a term
     // of the wrong shape gains a hundred times what it leaves. Without a model it says what is there at all.
     const double dominance = b->hypothesis->inertia_free ? 5.0 : 1000.0;
-    // And a name that takes away less than this of all that the others leave is a piece of something else.
-    const double part_of_rest = 0.3, rest = fmax(0.5 * (b->fit->cost - (double)b->data->values), 0.0);
+    // And a name that does not take away far more than all that is left may be a piece of something else.
+    const double part_of_rest = b->hypothesis->inertia_free ? 0.3 : 10.0,
+                 rest = fmax(0.5 * (b->fit->cost - (double)b->data->values), 0.0);
     for (int e = 0; sim_effects[e]; e++) {
         if (!b->hypothesis->named[e] || is_in_time(b, e))
             continue;
@@ -227,9 +250,8 @@ static void judge_others(const struct bench *b, const struct structure *over_tim
         if (stands && j->of_mean) {
             double evidence = search_evidence(b->data, b->hypothesis, b->fit, e);
             stands = evidence > part_of_rest * rest &&
-                     (evidence > dominance * j->leftover ||
-                      evidence_beside(b->box, b->data, b->hypothesis, b->fit, e) >
-                          fmax(0.05 * evidence, 0.1 * j->leftover));
+                     (evidence > dominance * j->leftover || evidence_beside(b->box, b->data, b->hypothesis, b->fit, e) >
+                                                                fmax(0.05 * evidence, 0.1 * j->leftover));
         }
         if (stands && over_time->found)
             stands = evidence_outside(b->data, b->hypothesis, b->fit, e, over_time) > search_threshold(b->data, e);
@@ -283,46 +305,65 @@ static enum blackbox_group one_gap(const struct blackbox *box, const struct fit_
     return found;
 }
 
-bool judge(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,
-           const struct fit *fit, double validation_rms, bool worse, struct judgement *out_judgement)
+/// What the mean of the periods leaves, held against the black box. io_rest: the whitened residual on entry, what the
+/// black box leaves of it on return.
+static void judge_mean(const struct bench *b, double validation_rms, bool worse, double *io_rest, struct judgement *j)
 {
-    struct judgement *j = out_judgement;
-    struct blackbox box;
-    memset(j, 0, sizeof *j);
-    if (!blackbox_init(&box, data))
-        return false;
-    double left, *rest = malloc(data->values * sizeof *rest);
-    if (rest)
-        memcpy(rest, fit->residual, data->values * sizeof *rest);
-    j->leftover = blackbox_gain(&box, data, hypothesis, fit, blackbox_all, &left, rest);
-    double scale = fmax(left / (double)data->values, 1.0);
-    double chance = 0.5 * (double)box.columns + 12.0 * sqrt(0.5 * (double)box.columns);
     const double half_again = 1.5, visible = 1.12; // a third of the noise, in amplitude
     const double seen_again = 1.03;                // on data the fit has not seen: chance does not come twice
-    j->unexplained = worse ||
-                     (j->leftover / scale > chance && fit->cost > visible * left && !(validation_rms < seen_again)) ||
-                     fit->cost / (double)data->values > half_again * half_again || !(validation_rms < half_again);
+    double left, values = (double)b->data->values, columns = (double)b->box->columns;
+    j->leftover = blackbox_gain(b->box, b->data, b->hypothesis, b->fit, blackbox_all, &left, io_rest);
+    double chance = 0.5 * columns + 12.0 * sqrt(0.5 * columns);
+    bool structured = j->leftover / fmax(left / values, 1.0) > chance && b->fit->cost > visible * left;
+    j->unexplained = worse || (structured && !(validation_rms < seen_again)) ||
+                     b->fit->cost / values > half_again * half_again || !(validation_rms < half_again);
     j->of_mean = j->unexplained;
-    enum blackbox_group gap = hypothesis->inertia_free ? blackbox_groups : one_gap(&box, data, hypothesis, fit);
-    if (gap != blackbox_groups && !j->unexplained) {
-        j->unexplained = j->of_mean = true;
-        j->leftover = fit->cost;
-        snprintf(j->where, sizeof j->where, "several names were needed for one gap, which %s alone would close",
-                 blackbox_group_name(gap));
-    } else if (j->unexplained)
-        describe_rest(&box, data, hypothesis, fit, j->where, sizeof j->where);
-    struct structure over_time;
-    bool good = rest && look_over_time(data, fit, rest, &over_time);
-    if (!good)
-        memset(&over_time, 0, sizeof over_time);
-    if (over_time.found) {
-        j->leftover_in_time = over_time.nats;
-        if (!j->unexplained || over_time.nats > j->leftover)
-            snprintf(j->where, sizeof j->where, "%s", over_time.where);
-        j->unexplained = true;
+    if (j->unexplained) {
+        describe_rest(b->box, b->data, b->hypothesis, b->fit, j->where, sizeof j->where);
+        return;
     }
-    if (!worse)
-        good = good && judge_names(&(struct bench){&box, data, coverage, hypothesis, fit}, rest, &over_time, j);
+    enum blackbox_group gap =
+        b->hypothesis->inertia_free ? blackbox_groups : one_gap(b->box, b->data, b->hypothesis, b->fit);
+    if (gap == blackbox_groups)
+        return;
+    j->unexplained = j->of_mean = true;
+    j->leftover = b->fit->cost;
+    snprintf(j->where, sizeof j->where, "several names were needed for one gap, which %s alone would close",
+             blackbox_group_name(gap));
+}
+
+/// What differs between periods beyond noise.
+static void judge_over_time(const struct structure *over_time, struct judgement *j)
+{
+    if (!over_time->found)
+        return;
+    j->leftover_in_time = over_time->nats;
+    if (!j->unexplained || over_time->nats > j->leftover)
+        snprintf(j->where, sizeof j->where, "%s", over_time->where);
+    j->unexplained = true;
+}
+
+bool judge(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,
+           const struct fit *fit, const struct judge_validation *validation, struct judgement *out_judgement)
+{
+    struct blackbox box;
+    struct structure over_time;
+    memset(out_judgement, 0, sizeof *out_judgement);
+    double *rest = malloc(data->values * sizeof *rest);
+    if (!rest || !blackbox_init(&box, data)) {
+        free(rest);
+        return false;
+    }
+    const struct bench bench = {&box, data, coverage, hypothesis, fit};
+    memcpy(rest, fit->residual, data->values * sizeof *rest);
+    judge_mean(&bench, validation->whitened_rms, validation->worse, rest, out_judgement);
+    bool good = look_over_time(data, fit, rest, &over_time);
+    if (good) {
+        structure_merge(&over_time, &validation->over_time);
+        judge_over_time(&over_time, out_judgement);
+    }
+    if (good && !validation->worse)
+        good = judge_names(&bench, rest, &over_time, out_judgement);
     free(rest);
     blackbox_free(&box);
     return good;

@@ -6,6 +6,7 @@
 
 #include "lab/diagnose/diagnosis.h"
 #include "lab/diagnose/fit.h"
+#include "lab/diagnose/structure.h"
 
 struct judgement {
     bool unexplained, of_mean; ///< of_mean: of the mean of the periods, not only over time
@@ -16,8 +17,14 @@ struct judgement {
     char where[300]; ///< what is left, in words
 };
 
-/// Judges a finished search. `validation_rms` is the whitened RMS of the extended model on the validation data; `worse`
-/// says that the extended model errs more there than the refitted one.
+/// What data that the fit has not seen say of the extended model.
+struct judge_validation {
+    double whitened_rms;
+    bool worse;                 ///< it errs more there than the refitted model
+    struct structure over_time; ///< that it leaves there
+};
+
+/// Judges a finished search.
 /// Unexplained: the black box gains more than chance allows (its expected gain plus twelve standard deviations) and
 /// more than a third of the noise in amplitude, or one group of it does as well as three names, or the residual on fit
 /// or validation data is half again as large as the noise, or periods differ beyond chance.
@@ -25,7 +32,11 @@ struct judgement {
 /// what stays and more than the black box can do without it.
 /// Errors: false if memory is short.
 bool judge(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,
-           const struct fit *fit, double validation_rms, bool worse, struct judgement *out_judgement);
+           const struct fit *fit, const struct judge_validation *validation, struct judgement *out_judgement);
+
+/// Structure over time in what a model leaves of runs, whose noise must have been estimated.
+/// Errors: false if memory is short
+bool judge_structure(const struct fit_data *data, const struct sim_model *model, struct structure *out_structure);
 
 /// Named effects that another effect could replace within 6 nats. Returns how many were written.
 size_t judge_ties(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,

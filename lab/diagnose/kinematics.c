@@ -50,8 +50,8 @@ static bool scatter_of_periods(const struct evidence *e, double *out_power)
     for (size_t p = 0; p < P; p++)
         for (size_t k = 0; k <= e->kinematics.bins; k++) {
             const double *own = spectra + p * stride + 2 * k, *m = mean + 2 * k;
-            out_power[k] += ((own[0] - m[0]) * (own[0] - m[0]) + (own[1] - m[1]) * (own[1] - m[1])) /
-                            ((double)P * (double)(P - 1));
+            out_power[k] +=
+                ((own[0] - m[0]) * (own[0] - m[0]) + (own[1] - m[1]) * (own[1] - m[1])) / ((double)P * (double)(P - 1));
         }
     free(spectra);
     return true;
@@ -143,9 +143,8 @@ static double systematic_power(const struct evidence *e, const struct sim_model 
     size_t n = r->block.samples, reversals = 0;
     for (size_t i = 1; i < n; i++)
         reversals += (v[i] > 0.0) != (v[i - 1] > 0.0);
-    struct sim_motion at = {.position = r->coverage.position_mean,
-                            .velocity = 1e-3 * r->coverage.velocity_rms,
-                            .linear = r->linear};
+    struct sim_motion at = {
+        .position = r->coverage.position_mean, .velocity = 1e-3 * r->coverage.velocity_rms, .linear = r->linear};
     struct sim_opposing o;
     sim_plant_opposing(model, &at, &o);
     double moved = model->motor_inertia_kgm2;

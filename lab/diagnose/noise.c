@@ -195,11 +195,11 @@ static void differentiate(size_t bins, size_t samples, double factor, size_t ord
 }
 
 /// Nobody's torque and speed columns are of the same instant to the microsecond: a skew s makes s jw T. And a speed
-/// that is the derivative of samples is wrong by (w h)^2 / 12 of it, more or less and late or early, by how the torque
-/// changed between them.
+/// that is the derivative of samples is wrong by some (w h)^2 / 12 of it, (w h)^4 / 120 and smaller terms, too large or
+/// late, by how the torque changed between them.
 static void make_allowances(struct evidence *self)
 {
-    const double skew = 0.005; // of a sample
+    const double together = 0.005, apart = 1.0; // of a sample; without a reference the torque may be a held command
     const struct recording *r = self->recording;
     size_t bins = r->band + 1, n = r->block.samples;
     double *shape = self->work + 6 * n, *nothing = shape + 2 * bins;
@@ -207,11 +207,11 @@ static void make_allowances(struct evidence *self)
     self->allowance_count = 0;
     memset(nothing, 0, 2 * bins * sizeof *nothing);
     evidence_transform(self, r->block.torque, shape);
-    differentiate(bins, n, skew, 1, shape);
+    differentiate(bins, n, reference ? together : apart, 1, shape);
     allow(self, reference ? nothing : shape, reference ? shape : nothing);
-    for (size_t order = 3; r->derived && order <= 4; order++) {
+    for (size_t order = 3; r->derived && order <= 8; order++) {
         evidence_transform(self, r->block.velocity, shape);
-        differentiate(bins, n, self->scale_inertia * r->rate_hz / 12.0, order, shape);
+        differentiate(bins, n, self->scale_inertia * r->rate_hz / (order <= 4 ? 12.0 : 120.0), order, shape);
         allow(self, shape, nothing);
     }
 }

@@ -10,7 +10,7 @@
 
 struct fft_plan;
 
-enum { evidence_allowances = 3 };
+enum { evidence_allowances = 7 };
 
 /// A recording with its noise: what a likelihood needs. Channels: mechanics, and actuator if there is a reference.
 struct evidence {
@@ -22,7 +22,7 @@ struct evidence {
     double *covariance; ///< per bin 0..band: S_mm, S_aa, Re S_am, Im S_am of the block's DFT divided by its length
     double *factor;     ///< per bin: inverse Cholesky factor, l_mm, l_aa, Re l_am, Im l_am
     size_t allowance_count;
-    double *allowances;                        ///< values each: unit vectors of what no cause is, but no noise either
+    double *allowances;                         ///< values each: unit vectors of what no cause is, but no noise either
     double allowance_kept[evidence_allowances]; ///< share that is kept of a residual along each, one after the other
     double *work;
     struct contrast contrast;

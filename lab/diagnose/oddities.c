@@ -2,10 +2,12 @@
 #include "lab/diagnose/oddities.h"
 
 #include "lab/diagnose/recording.h"
+#include "lab/numeric/fft.h"
 
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 void oddities_add(struct oddities *self, const char *format, ...)
@@ -80,6 +82,64 @@ static void say_jitter(const struct run *run, struct oddities *io)
             path_of(run), rms, 1.0 / mean);
 }
 
+enum { hush_rows = 4096, hush_bands = 40 };
+
+/// Power of a column's noise in bands of equal width up to half the rate, from third differences, which leave little of
+/// the motion to leak; false if memory is short.
+static bool find_noise(const double *x, size_t rows, double out_power[hush_bands])
+{
+    struct fft_plan *plan = fft_plan_create(hush_rows);
+    double *in = calloc(4 * hush_rows, sizeof *in);
+    bool good = plan && in;
+    memset(out_power, 0, hush_bands * sizeof *out_power);
+    for (size_t from = 3; good && from + hush_rows <= rows; from += hush_rows / 2) {
+        for (size_t i = 0; i < hush_rows; i++) {
+            const double *at = x + from + i;
+            double taper = sin(3.14159265358979324 * ((double)i + 0.5) / hush_rows);
+            in[2 * i] = taper * taper * taper * taper * (at[0] - 3.0 * at[-1] + 3.0 * at[-2] - at[-3]);
+            in[2 * i + 1] = 0.0;
+        }
+        fft_forward(plan, in, in + 2 * hush_rows);
+        for (size_t k = 1; k < hush_rows / 2; k++) {
+            const double *out = in + 2 * hush_rows + 2 * k;
+            double gain = pow(2.0 * sin(3.14159265358979324 * (double)k / hush_rows), 6.0);
+            out_power[k * hush_bands * 2 / hush_rows] += (out[0] * out[0] + out[1] * out[1]) / gain;
+        }
+    }
+    if (plan)
+        fft_plan_destroy(plan);
+    free(in);
+    return good;
+}
+
+/// A position whose noise is gone at high frequencies, as no sensor's is.
+static void say_hushed(const struct run *run, const char *name, struct oddities *io)
+{
+    const double *x = run_column(run, name);
+    double power[hush_bands], low = INFINITY, high = -INFINITY;
+    if (!x || run->rows < hush_rows + 3 || !find_noise(x, run->rows, power))
+        return;
+    for (size_t n = 0; n < run->rows; n++) {
+        low = fmin(low, x[n]);
+        high = fmax(high, x[n]);
+    }
+    // Per band there are so many bins, each with the power of a window's squared taper (35/128 of the rows).
+    double bins = hush_rows / 2.0 / hush_bands, windows = floor(((double)run->rows - 3.0) / (hush_rows / 2.0)) - 1.0;
+    double quiet = power[hush_bands - 2],
+           deviation = sqrt(quiet / (bins * fmax(windows, 1.0) * hush_rows * 35.0 / 128.0));
+    const double finest = 1e-9, about = 10.0;
+    if (!(deviation < finest * (high - low)))
+        return;
+    size_t from = hush_bands - 2;
+    while (from > 0 && power[from - 1] < about * quiet)
+        from--;
+    oddities_add(
+        io,
+        "%s: above %.3g Hz %s resolves %.1g of its range, which no sensor does: it was low-pass filtered before "
+        "it was recorded, or simulated. The noise found in it is less than the sensor's.",
+        path_of(run), 0.5 * run->sample_rate_hz * (double)from / hush_bands, name, deviation / (high - low));
+}
+
 void oddities_of_run(const struct run *run, const struct recording *recording, struct oddities *io_oddities)
 {
     static const char *const names[] = {"torque_ref_Nm", "force_ref_N", "torque_Nm", "force_N"};
@@ -89,6 +149,7 @@ void oddities_of_run(const struct run *run, const struct recording *recording, s
     for (size_t i = 0; i < sizeof motion / sizeof motion[0]; i++)
         say_clipped(run, motion[i], io_oddities);
     say_jitter(run, io_oddities);
+    say_hushed(run, run->linear ? "position_m" : "position_rad", io_oddities);
     if (recording->filled > 0)
         oddities_add(io_oddities,
                      "%s: %zu of %zu rows were lost or repeat the one before; they were filled from the rows "

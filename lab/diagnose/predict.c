@@ -23,10 +23,12 @@ static bool is_lost(const struct stretch *s, size_t n)
     return s->lost && s->lost[n];
 }
 
-/// Torque over substep i when only the measured torque is known: straight between its samples.
+/// Torque over substep i when only the measured torque is known: straight between its samples unless they are held.
 static double measured_torque(const struct predictor *p, size_t n, size_t i)
 {
     const double *torque = p->stretch->torque;
+    if (p->stretch->held)
+        return torque[n];
     size_t last = p->stretch->samples - 1;
     size_t next = n < last ? n + 1 : p->cyclic ? 0 : last;
     double part = ((double)i + 0.5) / (double)p->stretch->substeps;
@@ -270,9 +272,33 @@ static void start(struct predictor *p)
     sim_actuator_init(&p->actuator);
 }
 
+/// Nothing accelerates: the torque is what opposes the motion. A step of the simulator would say that too, but so would
+/// one of a body that no torque can move.
+static void balance(const struct sim_model *model, const struct stretch *stretch, double *out_mechanics)
+{
+    for (size_t n = 0; n < stretch->samples; n++) {
+        struct sim_motion motion = {.position = stretch->position[n],
+                                    .velocity = stretch->velocity[n],
+                                    .time_s = stretch->start_s + (double)n / model->sample_rate_hz,
+                                    .linear = model->linear};
+        struct sim_opposing opposing;
+        sim_plant_opposing(model, &motion, &opposing);
+        double sign = (double)(motion.velocity > 0.0) - (double)(motion.velocity < 0.0);
+        double factor = motion.velocity < 0.0 ? opposing.negative_factor : opposing.positive_factor;
+        double friction = factor * (opposing.viscous + sign * opposing.dry);
+        out_mechanics[n] = is_lost(stretch, n) ? 0.0 : opposing.smooth + friction - stretch->torque[n];
+    }
+}
+
 void predict(const struct sim_model *model, const struct stretch *stretch, bool cyclic, double scale_inertia,
              double *out_mechanics, double *out_actuator)
 {
+    if (stretch->still) {
+        balance(model, stretch, out_mechanics);
+        if (out_actuator)
+            memset(out_actuator, 0, stretch->samples * sizeof *out_actuator);
+        return;
+    }
     struct predictor p = {.stretch = stretch, .cyclic = cyclic};
     sim_stepper_init_quick(&p.stepper, model, 1.0 / (model->sample_rate_hz * (double)stretch->substeps));
     p.hidden = 2 * (p.stepper.chain.masses - 1);

@@ -103,9 +103,9 @@ static bool take_motion(struct recording *r, const double *position, const doubl
     size_t rows = r->all.samples, period = r->periodic ? r->block.samples : 0;
     r->all.position = malloc(rows * sizeof(double));
     r->all.velocity = malloc(rows * sizeof(double));
-    bool good = r->all.position && r->all.velocity &&
-                motion_estimate(rows, r->rate_hz, position, velocity, period, &r->all, r->motion_from,
-                                sizeof r->motion_from);
+    bool good =
+        r->all.position && r->all.velocity &&
+        motion_estimate(rows, r->rate_hz, position, velocity, period, &r->all, r->motion_from, sizeof r->motion_from);
     r->derived = position && !r->all.kinematics;
     return good;
 }
@@ -190,8 +190,7 @@ static bool make_block(struct recording *r, size_t n)
 {
     r->block.samples = n;
     return average(r, r->all.torque_ref, n, &r->block.torque_ref) && average(r, r->all.torque, n, &r->block.torque) &&
-           average(r, r->all.position, n, &r->block.position) &&
-           average(r, r->all.velocity, n, &r->block.velocity) &&
+           average(r, r->all.position, n, &r->block.position) && average(r, r->all.velocity, n, &r->block.velocity) &&
            average(r, r->all.kinematics, n, &r->block.kinematics);
 }
 
@@ -292,8 +291,10 @@ static bool choose_bins(const struct run *run, struct recording *r)
 /// Half as far again as the excitation goes: friction puts harmonics there, and nothing drives the model there.
 static void choose_band(struct recording *r)
 {
+    double most = 0.4 * (double)r->block.samples; // beyond, a derivative of samples is no speed
+    while (r->bin_count > 1 && (double)r->bins[r->bin_count - 1] > most)
+        r->bin_count--;
     size_t highest = r->bins[r->bin_count - 1];
-    double most = 0.4 * (double)r->block.samples;
     r->band = (size_t)fmin(1.5 * (double)highest, most);
 }
 
@@ -310,6 +311,19 @@ static double peak_of(size_t count, const double *values)
     for (size_t i = 0; i < count; i++)
         peak = fmax(peak, fabs(values[i]));
     return peak;
+}
+
+/// Correlation of position with time: 1 where the axis moves at constant speed.
+static double steadiness(const struct stretch *b, double mean)
+{
+    double xx = 0.0, tt = 0.0, xt = 0.0, middle = 0.5 * (double)(b->samples - 1);
+    for (size_t i = 0; i < b->samples; i++) {
+        double x = b->position[i] - mean, t = (double)i - middle;
+        xx += x * x;
+        tt += t * t;
+        xt += x * t;
+    }
+    return xx > 0.0 ? fabs(xt) / sqrt(xx * tt) : 0.0;
 }
 
 static void measure_coverage(struct recording *r)
@@ -329,6 +343,7 @@ static void measure_coverage(struct recording *r)
     r->coverage = (struct sim_coverage){
         .position_span = high - low,
         .position_mean = position / n,
+        .steadiness = steadiness(b, position / n),
         .velocity_rms = sqrt(velocity / n),
         .velocity_peak = peak,
         .torque_rms = sqrt(fmax(torque / n - mean * mean, 0.0)),

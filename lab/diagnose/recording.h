@@ -25,12 +25,14 @@ struct stretch {
     double *kinematics; ///< speed column less the derivative of the position column; NULL: not both are there
     double start_s;     ///< time of the first sample since the run began; of a mean of periods the middle of them all,
                         ///< where the clock of effects that depend on time stands still
+    bool held;          ///< the torque of a row acts until the next, instead of going straight there
+    bool still;         ///< nothing accelerates: all of the torque goes against friction and what depends on place
     bool *lost;         ///< rows that were not measured: NULL if there are none, and in a mean of periods
 };
 
 struct recording {
     bool linear, periodic;
-    bool derived; ///< the speed is the derivative of the position
+    bool derived;           ///< the speed is the derivative of the position
     const char *input_unit; ///< NULL: a torque or a force; "A", "V": what stands for it, in that unit
     double rate_hz;
     size_t periods;       ///< counted ones; 1 if not periodic

@@ -2,6 +2,7 @@
 #include "lab/diagnose/report.h"
 
 #include "lab/diagnose/report_curves.h"
+#include "lab/diagnose/report_where.h"
 #include "lab/diagnose/wording.h"
 #include "lab/record/atomic_file.h"
 
@@ -10,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { sentences_max = 12 };
+enum { sentences_max = 24 };
 
 /// The catalogue's sentences are plain ASCII for the terminal; a page has the sign.
 static void with_signs(const char *text, char out_text[wording_size])
@@ -94,7 +95,8 @@ static void add_given(struct page *page, const struct diagnosis *self)
         page_add_pair(page, "Motion", "%s", self->motion_from);
     }
     for (size_t i = 0; i < self->oddities.count; i++)
-        page_add_pair(page, "Note", "%s", self->oddities.texts[i]);
+        if (self->motion_from[0] == '\0' || !strstr(self->oddities.texts[i], self->motion_from))
+            page_add_pair(page, "Note", "%s", self->oddities.texts[i]);
     if (self->curves.rate_hz > 0.0 && self->curves.samples > 0) {
         page_add_pair(page, "Curves below", "%zu samples at %.6g Hz (%.4g s) of the data judged on",
                       self->curves.samples, self->curves.rate_hz, (double)self->curves.samples / self->curves.rate_hz);
@@ -188,9 +190,9 @@ static void add_time(struct page *page, const struct diagnosis *self)
     figure.legend = figure_legend_below;
     add_error_panel(&figure, self, 0, c->samples);
     page_add_figure(page, &figure,
-                    "%s that each model lacks over time, in the band looked at: %.3g %s RMS as given, %.3g %s "
+                    "The %s that each model lacks over time, in the band looked at: %.3g %s RMS as given, %.3g %s "
                     "%s.",
-                    self->linear ? "Force" : "Torque", report_rms(c->residual_nominal, c->samples), units.torque_unit,
+                    units.torque, report_rms(c->residual_nominal, c->samples), units.torque_unit,
                     report_rms(c->residual_extended, c->samples), units.torque_unit, best_model(self));
 
     size_t width = zoom_width(c->samples), from = report_worst_stretch(c, width);
@@ -205,6 +207,50 @@ static void add_time(struct page *page, const struct diagnosis *self)
     page_add_figure(page, &figure,
                     "The same around the worst %.3g s of the given model, from %.4g s on, with the speed.",
                     (double)width / c->rate_hz, c->time_s[from]);
+}
+
+static void add_places(struct page *page, const struct diagnosis *self)
+{
+    struct wording_units units = wording_units(self);
+    struct report_places places;
+    if (!report_places_find(&self->curves, &places))
+        return;
+    struct figure figure;
+    char label[figure_text_max];
+    snprintf(label, sizeof label, "%s error in %s, RMS", units.torque, units.torque_unit);
+    figure_start(&figure, self->linear ? "position in m" : "position in rad", axis_linear);
+    figure.legend = figure_legend_below;
+    struct figure_panel *panel = figure_add_panel(&figure, label, axis_linear);
+    panel->height = 130;
+    panel->from_zero = true;
+    figure_add_points(panel, "model as given", report_places, places.position, places.nominal)->colour =
+        figure_vermilion;
+    figure_add_points(panel, best_model(self), report_places, places.position, places.extended)->colour = figure_green;
+    page_add_figure(page, &figure, "The errors by place, over %d equal parts of the travel.", report_places);
+}
+
+/// Where the errors lie, beside how much of the recording that is.
+static void add_shares(struct page *page, const struct diagnosis *self)
+{
+    static const char *const heads[] = {"where", "share of the samples", "of the given model's error", "of what stays"};
+    struct report_share shares[report_shares_max];
+    size_t count = report_shares_find(&self->curves, self->linear, shares);
+    if (count == 0)
+        return;
+    page_start_table(
+        page,
+        "Where the squared errors lie. Where a share is no larger than that of the samples, the place is no "
+        "hint at the cause.",
+        "lrrr", heads);
+    for (size_t i = 0; i < count; i++) {
+        char samples[wording_short], nominal[wording_short], extended[wording_short];
+        wording_percent(shares[i].samples, samples);
+        wording_percent(shares[i].nominal, nominal);
+        wording_percent(shares[i].extended, extended);
+        const char *cells[] = {shares[i].what, samples, nominal, extended};
+        page_add_row(page, cells);
+    }
+    page_end_table(page);
 }
 
 static void add_parameter_rows(struct page *page, const struct diagnosis_cause *cause, bool linear)
@@ -425,6 +471,8 @@ void diagnosis_report_sections(struct page *page, const struct diagnosis *self)
     page_add_section(page, self->verdict == diagnosis_no_discrepancy ? "How well the model fits" : "What is wrong");
     add_spectrum(page, self);
     add_time(page, self);
+    add_places(page, self);
+    add_shares(page, self);
     add_causes(page, self);
     add_friction(page, self);
     add_gain(page, self);

@@ -207,8 +207,8 @@ static const double start_too_far = 30.0, place_too_far = 4.0, scan_too_far = 30
 
 /// The scan values with one step each, the lowest cost first; returns how many are worth more.
 static size_t step_restructured(struct fit *scratch, const struct fit_data *data, const struct hypothesis *from,
-                                int effect, double values[][sim_effect_parameters_max], size_t count,
-                                struct candidate *out_list)
+                                const struct fit *fit, int effect, double values[][sim_effect_parameters_max],
+                                size_t count, struct candidate *out_list)
 {
     size_t stepped = 0;
     double lowest = INFINITY;
@@ -221,30 +221,30 @@ static size_t step_restructured(struct fit *scratch, const struct fit_data *data
     qsort(out_list, count, sizeof *out_list, by_cost);
     while (stepped < count && out_list[stepped].cost <= start_too_far * lowest) {
         struct candidate *place = &out_list[stepped++];
-        place->cost = fit_roughly(scratch, data, &place->hypothesis, 1) ? scratch->cost : INFINITY;
+        place->cost = fit_roughly(scratch, data, from, fit, &place->hypothesis, 1) ? scratch->cost : INFINITY;
     }
     qsort(out_list, stepped, sizeof *out_list, by_cost);
     return stepped;
 }
 
-/// Where the structure changes, derivatives of the old one are worth nothing: scan values get one step of their own,
-/// the lowest few a short fit. `cost`: of the model without.
+/// Where the structure changes, derivatives of the old one are worth little: scan values get one step of their own, the
+/// lowest few a short fit.
 static void scan_restructured(struct fit *scratch, const struct fit_data *data, const struct hypothesis *from,
-                              double cost, int effect, double values[][sim_effect_parameters_max], size_t count,
-                              struct candidate *out)
+                              const struct fit *fit, int effect, double values[][sim_effect_parameters_max],
+                              size_t count, struct candidate *out)
 {
     enum { tried = 4 };
     struct candidate *list = calloc(count, sizeof *list);
     if (!list)
         return;
-    size_t stepped = step_restructured(scratch, data, from, effect, values, count, list);
+    size_t stepped = step_restructured(scratch, data, from, fit, effect, values, count, list);
     if (stepped > 0 && isfinite(list[0].cost)) {
         out->cost = list[0].cost;
         out->hypothesis = list[0].hypothesis;
     }
-    bool hopeless = !(out->cost <= scan_too_far * cost);
+    bool hopeless = !(out->cost <= scan_too_far * fit->cost);
     for (size_t i = 0; i < tried && i < stepped && !hopeless && list[i].cost <= place_too_far * out->cost; i++)
-        if (fit_roughly(scratch, data, &list[i].hypothesis, scan_iterations) && scratch->cost < out->cost) {
+        if (fit_roughly(scratch, data, from, fit, &list[i].hypothesis, scan_iterations) && scratch->cost < out->cost) {
             out->cost = scratch->cost;
             out->hypothesis = list[i].hypothesis;
         }
@@ -263,7 +263,7 @@ static bool scan_effect(struct fit *scratch, const struct fit_data *data, const 
         struct hypothesis trial = *from;
         hypothesis_name(&trial, effect, values[i]);
         if (restructures(effect, from, &trial)) {
-            scan_restructured(scratch, data, from, fit->cost, effect, values, count, out);
+            scan_restructured(scratch, data, from, fit, effect, values, count, out);
             break;
         }
         if (fit_step(scratch, data, from, fit, &trial) && scratch->cost < out->cost) {
@@ -304,7 +304,7 @@ static bool add_best(const struct fit_data *data, const struct sim_coverage *cov
         qsort(list, count, sizeof *list, by_cost);
         size_t chosen = count;
         for (size_t i = 0; i < count && i < refined_candidates; i++) {
-            fit_run(&scratch, data, &list[i].hypothesis, refine_iterations);
+            fit_roughly(&scratch, data, NULL, NULL, &list[i].hypothesis, refine_iterations);
             double gain = scaled_gain(data, fit->cost, scratch.cost) - search_threshold(data, list[i].effect);
             if (gain > best && can_show(&list[i].hypothesis, coverage, list[i].effect)) {
                 best = gain;
@@ -341,7 +341,7 @@ double search_evidence(const struct fit_data *data, const struct hypothesis *hyp
     if (!fit_init(&trial, data))
         return -INFINITY;
     hypothesis_unname(&without, effect);
-    fit_run(&trial, data, &without, refine_iterations);
+    fit_roughly(&trial, data, NULL, NULL, &without, refine_iterations);
     double gain = 0.5 * (trial.cost - fit->cost);
     fit_free(&trial);
     return gain;

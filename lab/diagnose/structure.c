@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { cells = 16, orders_most = 2, fewest_periods = 4, octaves_most = 24 };
+enum { cells = 16, orders_most = 2, fewest_periods = 4, octaves_most = 24, bands_most = 48 };
 
 /// What chance may reach in one place; the log of the number of places comes on top.
 static const double floor_nats = 12.0;
@@ -240,18 +240,33 @@ static void find_burst_in(const struct evidence *e, const struct octave *o, cons
         keep(out, o, together, most_excess, octaves, where);
 }
 
+/// Bands to look for bursts in: octaves, the wide ones in pieces, because what swings for a moment is narrow.
+static size_t split_bands(size_t band, struct octave out[bands_most])
+{
+    struct octave octaves[octaves_most];
+    size_t octave_count = split_octaves(band, octaves), count = 0;
+    size_t widest = 2 * cells > band / 16 ? 2 * cells : band / 16;
+    for (size_t i = 0; i < octave_count; i++) {
+        size_t width = octaves[i].to - octaves[i].from, pieces = (width + widest - 1) / widest;
+        for (size_t j = 0; j < pieces && count < bands_most; j++)
+            out[count++] =
+                (struct octave){octaves[i].from + j * width / pieces, octaves[i].from + (j + 1) * width / pieces};
+    }
+    return count;
+}
+
 static void find_burst(const struct evidence *e, const double *contrasts, double *work, struct structure *out)
 {
     const size_t fewest_bins = cells; // two values per stretch
-    struct octave octaves[octaves_most];
-    size_t P = e->recording->periods, count = split_octaves(e->recording->band, octaves);
+    struct octave bands[bands_most];
+    size_t P = e->recording->periods, count = split_bands(e->recording->band, bands);
     double *powers = work + 4 * e->recording->block.samples;
     for (size_t i = 0; i < count; i++) {
-        if (octaves[i].to - octaves[i].from < fewest_bins)
+        if (bands[i].to - bands[i].from < fewest_bins)
             continue;
         for (size_t p = 0; p < P; p++)
-            stretch_powers(e, contrasts + p * e->contrast.width, &octaves[i], work, powers + p * cells);
-        find_burst_in(e, &octaves[i], powers, (double)count, out);
+            stretch_powers(e, contrasts + p * e->contrast.width, &bands[i], work, powers + p * cells);
+        find_burst_in(e, &bands[i], powers, (double)count, out);
     }
 }
 

@@ -1,13 +1,60 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/diagnose/wording.h"
 
+#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
+/// Whether torques are in units of what one unit of the input makes.
+static bool in_input(const struct diagnosis *self)
+{
+    return self->input_unit && !self->model_given;
+}
+
 struct wording_units wording_units(const struct diagnosis *self)
 {
-    return self->linear ? (struct wording_units){"force", "N", "m/s"} : (struct wording_units){"torque", "Nm", "rad/s"};
+    const char *speed = self->linear ? "m/s" : "rad/s";
+    if (in_input(self))
+        return (struct wording_units){strcmp(self->input_unit, "V") == 0 ? "voltage" : "current", self->input_unit,
+                                      speed};
+    return self->linear ? (struct wording_units){"force", "N", speed} : (struct wording_units){"torque", "Nm", speed};
+}
+
+/// Replaces a unit wherever it stands after a space and is not the beginning of another word.
+static void replace_unit(const char *unit, const char *by, size_t size, char *io_text)
+{
+    char out[wording_size];
+    size_t used = 0, length = strlen(unit);
+    for (const char *at = io_text; *at && used + 1 < sizeof out; at++) {
+        bool word = at > io_text && at[-1] == ' ' && strncmp(at, unit, length) == 0 &&
+                    !isalnum((unsigned char)at[length]) && at[length] != '/';
+        if (word) {
+            used += (size_t)snprintf(out + used, sizeof out - used, "%s", by);
+            at += length - 1;
+            used = used < sizeof out ? used : sizeof out - 1;
+        } else {
+            out[used++] = *at;
+        }
+    }
+    out[used] = '\0';
+    snprintf(io_text, size, "%s", out);
+}
+
+void wording_in_units(const struct diagnosis *self, size_t size, char *io_text)
+{
+    // Longer units first: "Nm" is the beginning of "Nm s/rad".
+    static const struct {
+        const char *linear, *rotary, *linear_rest, *rotary_rest;
+    } units[] = {{"kg", "kg m2", " s2/m", " s2/rad"},
+                 {"N s/m", "Nm s/rad", " s/m", " s/rad"},
+                 {"N/m", "Nm/rad", "/m", "/rad"},
+                 {"N", "Nm", "", ""}};
+    for (size_t i = 0; in_input(self) && i < sizeof units / sizeof units[0]; i++) {
+        char by[wording_short];
+        snprintf(by, sizeof by, "%s%s", self->input_unit, self->linear ? units[i].linear_rest : units[i].rotary_rest);
+        replace_unit(self->linear ? units[i].linear : units[i].rotary, by, size, io_text);
+    }
 }
 
 void wording_effect(int effect, char out_text[wording_short])
@@ -86,7 +133,10 @@ void wording_headline(const struct diagnosis *self, char out_text[wording_size])
             snprintf(out_text, wording_size, "Not explained as a whole: %s %s, the rest has no name", list,
                      self->cause_count > 1 ? "stand" : "stands");
         } else {
-            snprintf(out_text, wording_size, "Not explained: no known cause fits");
+            char might[wording_size / 2];
+            wording_list(self->candidates, self->candidate_count, sizeof might, might);
+            snprintf(out_text, wording_size, "Not explained: no known cause %s%s%s", might[0] ? "stands, " : "fits",
+                     might, might[0] ? " might be part of it" : "");
         }
         return;
     case diagnosis_no_discrepancy:
@@ -143,17 +193,43 @@ static bool next_of_effect(int effect, const char *lead, char out_text[wording_s
     return measure != NULL;
 }
 
+/// Whether an effect between the reference and the torque was not tested for because no reference was recorded.
+static bool lacks_reference(const struct diagnosis_untestable *untestable)
+{
+    return sim_effects[untestable->effect]->place == sim_place_actuator &&
+           strstr(untestable->why, "reference was recorded");
+}
+
+/// What would show the effects not tested for; those that wait for the same column in one sentence.
+static size_t next_of_untestable(const struct diagnosis *self, size_t max, char (*out_texts)[wording_size])
+{
+    struct diagnosis_cause waiting[sim_effects_max] = {{0}};
+    size_t count = 0, waiting_count = 0;
+    for (size_t i = 0; i < self->untestable_count; i++) {
+        if (lacks_reference(&self->untestable[i]))
+            waiting[waiting_count++].effect = self->untestable[i].effect;
+        else if (count < max)
+            count += next_of_effect(self->untestable[i].effect, "To test for", out_texts[count]);
+    }
+    if (waiting_count > 0 && count < max) {
+        char list[wording_size / 2];
+        const char *what = self->input_unit ? strcmp(self->input_unit, "V") == 0 ? "voltage" : "current"
+                           : self->linear   ? "force"
+                                            : "torque";
+        wording_list(waiting, waiting_count, sizeof list, list);
+        snprintf(out_texts[count++], wording_size,
+                 "To test for %s: record beside the %s what the controller asked for (its reference).", list, what);
+    }
+    return count;
+}
+
 /// While something is unexplained: what would confirm the candidates, and what would show the effects not tested for.
 static size_t next_of_open(const struct diagnosis *self, size_t max, char (*out_texts)[wording_size])
 {
     size_t count = 0;
-    for (size_t i = 0; i < self->candidate_count && count < max; i++) {
+    for (size_t i = 0; i < self->candidate_count && count < max; i++)
         count += next_of_effect(self->candidates[i].effect, "To confirm or rule out", out_texts[count]);
-    }
-    for (size_t i = 0; i < self->untestable_count && count < max; i++) {
-        count += next_of_effect(self->untestable[i].effect, "To test for", out_texts[count]);
-    }
-    return count;
+    return count + next_of_untestable(self, max - count, out_texts + count);
 }
 
 /// What is worth taking over into the model, NULL if nothing is.

@@ -7,14 +7,18 @@
 
 enum { wording_short = 32, wording_size = 1024 };
 
-/// Names of quantities and units on a rotary or a linear axis.
+/// Names of quantities and units on a rotary or a linear axis; where the recordings have a current or a voltage and no
+/// model says what torque that makes, it stands for the torque.
 struct wording_units {
-    const char *torque;      ///< "torque", "force"
-    const char *torque_unit; ///< "Nm", "N"
+    const char *torque;      ///< "torque", "force", "current", "voltage"
+    const char *torque_unit; ///< "Nm", "N", "A", "V"
     const char *speed_unit;  ///< "rad/s", "m/s"
 };
 
 struct wording_units wording_units(const struct diagnosis *self);
+
+/// Puts the unit of the input for that of the torque into a sentence about an effect, where wording_units() does.
+void wording_in_units(const struct diagnosis *self, size_t size, char *io_text);
 
 /// An effect's id as words: "load bias".
 void wording_effect(int effect, char out_text[wording_short]);

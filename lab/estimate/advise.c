@@ -45,10 +45,13 @@ static bool is_unsettled(const struct periodic *recording)
 static double restless_level(const struct periodic *recording)
 {
     double sum = 0.0;
+    double count = 0.0;
     for (size_t p = recording->total / 2; p < recording->total; p++) {
-        sum += recording->output_level[p] * recording->output_level[p];
+        const double level = recording->output_level[p];
+        sum += isnan(level) ? 0.0 : level * level;
+        count += isnan(level) ? 0.0 : 1.0;
     }
-    return sqrt(sum / (double)(recording->total - recording->total / 2));
+    return count > 0.0 ? sqrt(sum / count) : 0.0;
 }
 
 static void add_settling(const struct periodic *recording, struct estimate_advice *io_advice)
@@ -57,10 +60,10 @@ static void add_settling(const struct periodic *recording, struct estimate_advic
         add(io_advice, "%zu periods are too few to see whether it has settled", recording->total);
     } else if (!recording->transient.settled) {
         add(io_advice, "it has not settled in its first half (%.2g of the output in the first period)",
-            recording->output_level[0]);
+            periodic_first_level(recording));
     } else if (is_unsettled(recording)) {
         add(io_advice, "a transient (%.2g of the output in the first period) takes %zu of %zu periods to settle",
-            recording->output_level[0], recording->transient.periods, recording->total);
+            periodic_first_level(recording), recording->transient.periods, recording->total);
     } else if (restless_level(recording) > restless) {
         add(io_advice,
             "no transient stands out of what differs from period to period anyway (%.2g of the output): whether it has "

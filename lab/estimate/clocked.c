@@ -19,6 +19,7 @@ static const double arrived_std = 0.5;
 static const double apart_rad = 0.5;
 /// A period found this near a whole number is taken for one.
 static const double whole_number = 0.05;
+static const double most_of_a_clock = 1e-3;
 
 /// What is known of the true period: samples + offset + drift x after x periods.
 struct true_period {
@@ -222,6 +223,14 @@ static int check_period(const struct run *run, const char *input, size_t said, b
                      check.found.period_samples);
 }
 
+/// A clock is off by hundreds of parts per million at most: a period of another whole number is a miscount.
+static bool is_miscounted(const struct true_period *period)
+{
+    const double whole = round(period->offset);
+    return whole != 0.0 && fabs(period->offset) > most_of_a_clock * (double)period->samples &&
+           fabs(period->offset - whole) <= whole_number && period->drift == 0.0;
+}
+
 /// Before anything is cut by it.
 static int check_option(const struct run *run, const struct periodic_options *options, struct error *out_error)
 {
@@ -262,6 +271,12 @@ static int judge(const struct run *run, const struct periodic_options *options, 
         return 0;
     }
     add_offset(clock, &period);
+    if (is_miscounted(&period) && period.samples == run->period_samples) {
+        return error_set(out_error, error_refused,
+                         "%s: period_samples is %zu: %s and %s repeat every %.0f samples: expected --period %.0f",
+                         run->path, period.samples, recording->input, recording->output,
+                         (double)period.samples + round(period.offset), (double)period.samples + round(period.offset));
+    }
     int status = check_band(recording, &period, out_error);
     return status ? status : resample_until_steady(run, options, period, io_self, out_error);
 }

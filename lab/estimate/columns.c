@@ -47,6 +47,19 @@ static bool changes(const struct run *run, const char *name)
     return false;
 }
 
+/// The same numbers wherever nothing was lost, not all of them one number.
+static bool are_equal(const struct run *run, const char *one, const char *other)
+{
+    const double *a = run_column(run, one);
+    const double *b = run_column(run, other);
+    const double *valid = run_column(run, "valid");
+    size_t n = 0;
+    while (n < run->rows && (a[n] == b[n] || is_lost(valid, n))) {
+        n++;
+    }
+    return n == run->rows && changes(run, one);
+}
+
 enum { names_size = 400 };
 
 /// The columns there are: "t_s, iq_A, ...", as many as there is room for.
@@ -152,6 +165,12 @@ static int check_motion(const struct run *run, const struct columns *columns, st
         return error_set(out_error, error_refused,
                          "%s: input and output are both %s: expected two signals, see --input, --output", run->path,
                          columns->input);
+    }
+    if (are_equal(run, columns->input, columns->output)) {
+        return error_set(out_error, error_refused,
+                         "%s: %s and %s hold the same numbers in all %zu rows, their response is 1: expected two "
+                         "signals, see --input, --output",
+                         run->path, columns->input, columns->output, run->rows);
     }
     if (!changes(run, columns->input)) {
         return error_set(out_error, error_refused,

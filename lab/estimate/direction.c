@@ -10,10 +10,17 @@
 
 static const double two_pi = 6.283185307179586476925;
 
-/// Below this cosine two motions are opposite, whatever their sensors lag by.
-static const double opposite = -0.7;
-/// The same against the input, where a quarter turn is nothing unusual.
-static const double opposite_to_input = -0.4;
+/// Two columns are opposite where some delay turns one against the other by at least so much ...
+static const double opposite = 0.6;
+/// ... and no delay turns it to the other side by more than this: sign and delay can be told apart.
+static const double not_opposite = 0.4;
+/// Sensors, filters and busses lag by less; beyond an eighth of a period delays alias on a sparse grid of lines.
+static const double longest_delay_s = 0.1;
+static const double longest_delay_periods = 0.125;
+/// Over fewer than these the phase of a structure's own antiresonance and resonance passes for a sign.
+static const double least_span = 5.0;
+/// A spring's velocity leads by 90 degrees, as a reversed inertia's does, but rises with frequency (slope 1).
+static const double spring_slope = 0.3;
 
 enum { fewest_lines = 3 };
 
@@ -69,15 +76,53 @@ static double complex *velocity_of(const struct periodic *recording, const char 
     return spectra;
 }
 
-static double cosine_of(const double complex *a, const double complex *b, size_t lines, double complex turn)
+/// How well some delay makes two columns alike, and how well opposite: max and -min of the cosine over the delay.
+struct match {
+    double alike;
+    double opposite;
+};
+
+/// Cosines over a range of delays, in steps of 1/16 turn of the highest line. Errors: false if memory is short
+static bool match_columns(const struct periodic *recording, const double complex *a, const double complex *b,
+                          size_t lines, bool either_way, double complex turn, struct match *out)
 {
-    double product = 0.0;
-    double size = 0.0;
-    for (size_t line = 0; line < lines; line++) {
-        product += creal(a[line] * conj(b[line]) * turn);
-        size += cabs(a[line]) * cabs(b[line]);
+    *out = (struct match){-1.0, -1.0};
+    if (lines == 0) {
+        return true;
     }
-    return size > 0.0 ? product / size : 0.0;
+    const double length = (double)recording->period_samples;
+    const double longest =
+        fmin(longest_delay_s * recording->run->sample_rate_hz, longest_delay_periods * length) / length;
+    const double step = 1.0 / (16.0 * (double)recording->bins[lines - 1]);
+    const size_t steps = (size_t)(longest / step) + 1;
+    const size_t before = either_way ? steps : 0;
+    double complex *products = malloc(2 * lines * sizeof *products);
+    double size = 0.0;
+    for (size_t line = 0; line < lines && products; line++) {
+        const double angle = two_pi * (double)recording->bins[line] * step;
+        /* The root of the product's size weighs lines: a resonance shall not speak for all of them. */
+        const double weight = sqrt(cabs(a[line]) * cabs(b[line]));
+        products[line] =
+            weight > 0.0 ? a[line] * conj(b[line]) / weight * turn * cexp(-I * angle * (double)before) : 0.0;
+        products[lines + line] = cexp(I * angle);
+        size += weight;
+    }
+    for (size_t t = 0; t <= before + steps && products && size > 0.0; t++) {
+        double sum = 0.0;
+        for (size_t line = 0; line < lines; line++) {
+            sum += creal(products[line]);
+            products[line] *= products[lines + line];
+        }
+        out->alike = fmax(out->alike, sum / size);
+        out->opposite = fmax(out->opposite, -sum / size);
+    }
+    free(products);
+    return products != NULL;
+}
+
+static bool is_opposite(const struct match *match)
+{
+    return match->opposite > opposite && match->alike < not_opposite;
 }
 
 /// Lines on which load and motor move as one, from the lowest.
@@ -97,10 +142,10 @@ static size_t lines_together(const struct periodic *recording, const double comp
     return count >= fewest_lines ? count : 0;
 }
 
-static void note(struct direction *io_self, const char *name, const char *against, double cosine, double limit)
+static void note(struct direction *io_self, const char *name, const char *against, const struct match *match)
 {
-    if (cosine < limit && io_self->count < direction_found_max) {
-        io_self->found[io_self->count++] = (struct direction_finding){name, against, cosine};
+    if (io_self->count < direction_found_max) {
+        io_self->found[io_self->count++] = (struct direction_finding){name, against, -match->opposite};
     }
 }
 
@@ -150,38 +195,89 @@ static bool is_effort(const char *name)
     return false;
 }
 
-/// Against the input: the column that is surest speaks for the other too, which a slow sensor may hide.
-static void compare_to_input(const struct periodic *recording, const double complex *input, const struct motion *motor,
-                             size_t count, double between, struct direction *io_self)
+/// Slope of log |a/b| over log f, least squares over the lines where both are.
+static double slope_of_ratio(const struct periodic *recording, const double complex *a, const double complex *b)
 {
-    const double complex turn = CMPLX(sqrt(0.5), sqrt(0.5));
-    double cosines[names] = {0.0};
-    size_t surest = 0;
-    for (size_t i = 0; i < count; i++) {
-        cosines[i] = cosine_of(motor[i].velocity, input, recording->bin_count, turn);
-        surest = cosines[i] < cosines[surest] ? i : surest;
-    }
-    for (size_t i = 0; i < count && is_effort(recording->input) && cosines[surest] < opposite_to_input; i++) {
-        if (i == surest || between > -opposite) {
-            note(io_self, motor[i].name, recording->input, cosines[i], INFINITY);
+    double n = 0.0;
+    double x = 0.0;
+    double y = 0.0;
+    double xx = 0.0;
+    double xy = 0.0;
+    for (size_t line = 0; line < recording->bin_count; line++) {
+        const double ratio = cabs(b[line]) > 0.0 ? cabs(a[line]) / cabs(b[line]) : 0.0;
+        if (ratio > 0.0) {
+            const double u = log((double)recording->bins[line]);
+            const double v = log(ratio);
+            n += 1.0;
+            x += u;
+            y += v;
+            xx += u * u;
+            xy += u * v;
         }
     }
+    const double determinant = n * xx - x * x;
+    return determinant > 0.0 ? (n * xy - x * y) / determinant : 0.0;
 }
 
-static void compare(const struct periodic *recording, const double complex *input, const struct motion *motor,
+static bool tells_sign(const struct periodic *recording)
+{
+    const double span = (double)recording->bins[recording->bin_count - 1] / (double)recording->bins[0];
+    return recording->bin_count >= fewest_lines && span >= least_span && is_effort(recording->input);
+}
+
+/// Against the input: the column that is surest speaks for the other too, which a slow sensor may hide.
+static bool compare_to_input(const struct periodic *recording, const double complex *input, const struct motion *motor,
+                             size_t count, bool reversed_between, struct direction *io_self)
+{
+    const double complex turn = CMPLX(sqrt(0.5), sqrt(0.5));
+    struct match matches[names] = {{0.0, 0.0}};
+    size_t surest = 0;
+    if (count == 0 || !tells_sign(recording)) {
+        return true;
+    }
+    for (size_t i = 0; i < count; i++) {
+        if (!match_columns(recording, motor[i].velocity, input, recording->bin_count, false, turn, &matches[i])) {
+            return false;
+        }
+        surest = matches[i].alike < matches[surest].alike ? i : surest;
+    }
+    const bool found =
+        is_opposite(&matches[surest]) && slope_of_ratio(recording, motor[surest].velocity, input) < spring_slope;
+    for (size_t i = 0; i < count && found; i++) {
+        if (i == surest || !reversed_between) {
+            note(io_self, motor[i].name, recording->input, &matches[i]);
+        }
+    }
+    return true;
+}
+
+static bool compare(const struct periodic *recording, const double complex *input, const struct motion *motor,
                     size_t motor_count, const struct motion *load, size_t load_count, struct direction *out)
 {
-    const size_t lines = recording->bin_count;
-    double between = 0.0;
+    bool reversed = false;
+    struct match match;
     if (motor_count > 1) {
-        between = cosine_of(motor[1].velocity, motor[0].velocity, lines, 1.0);
-        note(out, motor[1].name, motor[0].name, between, opposite);
+        if (!match_columns(recording, motor[1].velocity, motor[0].velocity, recording->bin_count, true, 1.0, &match)) {
+            return false;
+        }
+        reversed = is_opposite(&match);
+        if (reversed) {
+            note(out, motor[1].name, motor[0].name, &match);
+        }
     }
-    compare_to_input(recording, input, motor, motor_count, between, out);
+    if (!compare_to_input(recording, input, motor, motor_count, reversed, out)) {
+        return false;
+    }
     for (size_t i = 0; i < load_count && motor_count > 0; i++) {
         const size_t together = lines_together(recording, load[i].velocity, motor[0].velocity);
-        note(out, load[i].name, motor[0].name, cosine_of(load[i].velocity, motor[0].velocity, together, 1.0), opposite);
+        if (!match_columns(recording, load[i].velocity, motor[0].velocity, together, true, 1.0, &match)) {
+            return false;
+        }
+        if (is_opposite(&match)) {
+            note(out, load[i].name, motor[0].name, &match);
+        }
     }
+    return true;
 }
 
 bool direction_measure(const struct periodic *recording, struct direction *out)
@@ -193,10 +289,8 @@ bool direction_measure(const struct periodic *recording, struct direction *out)
     *out = (struct direction){.count = 0};
     double complex *input = mean_input(recording);
     const bool done = input && find_motions(recording, motor_columns, motor, &motor_count) &&
-                      find_motions(recording, load_columns, load, &load_count);
-    if (done) {
-        compare(recording, input, motor, motor_count, load, load_count, out);
-    }
+                      find_motions(recording, load_columns, load, &load_count) &&
+                      compare(recording, input, motor, motor_count, load, load_count, out);
     for (size_t i = 0; i < names; i++) {
         free(motor[i].velocity);
         free(load[i].velocity);

@@ -22,16 +22,17 @@ struct direction {
 
 /// Compares the columns that tell a motion, at the excited lines, as velocities.
 ///
-/// velocity, position:    of one sensor: sum Re(V conj(j w P)) / sum |V| |j w P|, opposite below -0.7
+/// c(T) = sum Re(A conj(B) turn exp(j w T)) / sum |A| |B|, T up to 0.1 s, at most an eighth of a period: opposite
+/// where max -c > 0.6 and max c < 0.4, so that no delay explains what a sign does. Otherwise nothing is said.
+///
+/// velocity, position:    of one sensor, turn 1, T of either sign
 /// load, motor:           they move together below the antiresonance, where their ratio is largest: of the lines below
-///                        half of its frequency (at least 3, else nothing is said), opposite below -0.7
-/// motion, input:         a motor drives what it moves: without lag a response to torque, force, current or voltage
-/// lies
-///                        between 90 (spring) and -90 degrees (inertia), around 0 for friction.
-///                        sum Re(V conj(U) exp(j pi/4)) / sum |V| |U|, which leaves room for a sensor's lag, is far
-///                        above
-///                        0 then, and opposite below -0.4. Of the motor's columns only; where one of them is opposite,
-///                        the other is too unless they are opposite to each other
+///                        half of its frequency (at least 3), turn 1, T of either sign
+/// motion, input:         a motor drives what it moves: but for a delay a response to torque, force, current or voltage
+///                        lies between -90 degrees (inertia) and 0 (friction), turn exp(j pi/4), T >= 0. Of the
+///                        motor's columns only, over lines that span a factor of 5, where the response does not rise
+///                        with frequency as a spring's does; where the surest of them is opposite, the other is too
+///                        unless they are opposite to each other
 /// Errors: false if memory is short
 /// Test:   tests/unit/test_direction.c
 bool direction_measure(const struct periodic *recording, struct direction *out);

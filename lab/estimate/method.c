@@ -261,6 +261,9 @@ int estimate_end(const struct periodic *recording, struct frf *io_frf, struct er
     if (set && recording->lost > 0) {
         set = estimate_set_key(io_frf, "lost_periods", "%zu", recording->lost);
     }
+    if (set && recording->lost_outside > 0) {
+        set = estimate_set_key(io_frf, "lost_rows_outside", "%zu", recording->lost_outside);
+    }
     return set ? 0 : estimate_refuse_memory(io_frf, out_error);
 }
 

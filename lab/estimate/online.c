@@ -29,6 +29,7 @@ struct online {
     size_t next;         ///< number of the first period in the buffer
     size_t lost;
     size_t first_lost_row;
+    size_t lost_outside; ///< lost rows behind the leading part that cost no period
     bool has_last;
     bool is_position;
     struct trend trend;
@@ -258,6 +259,8 @@ static void note_lost_rows(struct online *self, const double *valid, size_t rows
     const size_t length = self->leading->period_samples;
     for (size_t n = 0; n < rows; n++) {
         const size_t row = self->filled + n;
+        const size_t period = self->next + row / length;
+        self->lost_outside += !(valid[n] > 0.5) && (period < self->settle_given || period >= self->limit);
         if (!(valid[n] > 0.5) && self->lost_row[row / length] == 0) {
             self->lost_row[row / length] = self->next * length + row + 1;
         }
@@ -341,6 +344,7 @@ static struct settle judge_leading(const struct online *self, const double compl
     struct settle self_settle = {0};
     double excess[2] = {0.0, 0.0};
     bool unsettled = true;
+    bool first = true;
     for (size_t p = 0, m = 0; p < end && (unsettled || p < 2); p++) {
         const bool usable = m < leading->used && leading->used_periods[m] == p;
         double level = 0.0;
@@ -352,8 +356,9 @@ static struct settle judge_leading(const struct online *self, const double compl
         if (p < 2) {
             excess[p] = above;
         }
-        *out_first_level = p == 0 ? level : *out_first_level;
-        self_settle.periods += unsettled;
+        *out_first_level = usable && first ? level : *out_first_level;
+        first = first && !usable;
+        self_settle.periods = unsettled && usable ? p + 1 : self_settle.periods;
     }
     self_settle.settled = self_settle.periods < end;
     if (excess[0] > 0.0 && excess[1] > 0.0) {
@@ -413,6 +418,21 @@ static void count_lost(const struct online *self, struct online_result *io_resul
         }
     }
     io_result->first_lost_row = first > 0 ? first : io_result->first_lost_row;
+}
+
+/// Lost rows of the leading part that are left out for settling.
+static size_t count_lost_outside(const struct periodic *leading, size_t settle)
+{
+    const size_t asked = settle * leading->period_samples;
+    const size_t whole = leading->total * leading->period_samples;
+    const size_t end = asked < whole ? asked : whole;
+    size_t count = 0;
+    size_t row = columns_first_lost_row(leading->run, 0, end);
+    while (row > 0) {
+        count++;
+        row = columns_first_lost_row(leading->run, row, end - row);
+    }
+    return count;
 }
 
 /// Sums up what the leading part adds, in the order that lets the settled periods be told from the others.
@@ -483,6 +503,7 @@ int online_end(struct online *self, double rate_hz, struct online_result *out_re
     whole.settle_source = out_result->settle_source;
     whole.settle = out_result->settle;
     whole.lost = out_result->lost;
+    whole.lost_outside = self->lost_outside + count_lost_outside(self->leading, out_result->settle);
     whole.used = out_result->used;
     status = estimate_begin(&whole, "mean", 2.0 * (double)(whole.used - 1), out_frf, out_error);
     const double certain_ratio = circle_certain_ratio(estimate_chance_of_dead_line, whole.used);

@@ -4,14 +4,17 @@
 #include "lab/estimate/spectra.h"
 #include "lab/estimate/stretch.h"
 
+#include <complex.h>
 #include <math.h>
 #include <stdlib.h>
 
-enum { rows_max = 1 << 20, fewest_cycles = 3, peak_reach = 2, fewest_bins = 100 };
+enum { rows_max = 1 << 20, fewest_cycles = 5, peak_reach = 2, fewest_bins = 100 };
 
 static const double two_pi = 6.283185307179586476925;
 static const double least_share = 0.3;
 static const double least_level = 0.02;
+/// What falls below this share of itself from the first half to the second dies away: a transient.
+static const double least_sustained = 0.4;
 
 /// Mean period of `periods` from `signal` on, without its mean; returns its RMS.
 static double mean_period(const double *signal, size_t periods, size_t length, double *out_mean)
@@ -77,6 +80,10 @@ static void judge(const double complex *spectrum, size_t rows, double rate_hz, d
         total += power_of(spectrum[k]);
         peak = power_of(spectrum[k]) > power_of(spectrum[peak]) ? k : peak;
     }
+    /* The skirt of a drift or a decay rises towards the bins that are not looked at. */
+    if (power_of(spectrum[peak]) < power_of(spectrum[peak - 1])) {
+        return;
+    }
     double own = 0.0;
     double centre = 0.0;
     for (size_t k = peak - peak_reach; k <= peak + peak_reach && k < bins; k++) {
@@ -92,6 +99,25 @@ static void judge(const double complex *spectrum, size_t rows, double rate_hz, d
     out->level = rms / repeating;
     out->share = fmin(own / total, 1.0);
     out->found = out->share >= least_share && out->level >= least_level;
+}
+
+/// Whether it is as strong late as early; the window is the same in both halves, mirrored.
+static bool is_sustained(const double *rest, size_t rows, double cycles_per_sample)
+{
+    double complex half[2] = {0.0, 0.0};
+    for (size_t n = 0; n < 2 * (rows / 2); n++) {
+        half[n / (rows / 2)] += rest[n] * cexp(-I * two_pi * fmod(cycles_per_sample * (double)n, 1.0));
+    }
+    return cabs(half[1]) >= least_sustained * cabs(half[0]);
+}
+
+/// A transient bends the drift: what its slope changes by from period to period is a sawtooth of the period,
+/// upwards early and downwards late, whose second harmonic has less than the least share.
+static bool is_transient_sawtooth(const struct periodic *recording, double frequency_hz, size_t periods)
+{
+    const double bin = frequency_hz * (double)(recording->period_samples * periods) / recording->run->sample_rate_hz;
+    const bool unsettled = !recording->transient.settled || recording->transient.periods > 0;
+    return unsettled && fabs(bin - (double)periods) < (double)peak_reach;
 }
 
 bool oscillation_measure(const struct periodic *recording, struct oscillation *out)
@@ -118,6 +144,8 @@ bool oscillation_measure(const struct periodic *recording, struct oscillation *o
         done = spectra_transform_two(rest, rest, rows, spectra, spectra + rows / 2 + 1);
         if (done) {
             judge(spectra, rows, recording->run->sample_rate_hz, repeating, out);
+            out->found = out->found && !is_transient_sawtooth(recording, out->frequency_hz, periods) &&
+                         is_sustained(rest, rows, out->frequency_hz / recording->run->sample_rate_hz);
         }
     }
     free(mean);

@@ -21,8 +21,10 @@ struct oscillation {
 ///
 /// Equation:  e[n] = y[n] - ybar[n mod N] - drift,  E its Hann spectrum;  power of the five bins around the peak
 ///            (docs/theory.md, F61)
-/// Found:     at least 0.3 of the power of e in them, and a level of at least 0.02; below three cycles of the stretch
-///            nothing is looked for: that is drift
+/// Found:     at least 0.3 of the power of e in them, and a level of at least 0.02; below five cycles of the stretch
+///            nothing is looked for, nor where the spectrum rises towards there: that is drift or decay; nor
+///            what falls below 0.4 of itself from the first half to the second, nor, unless settled, within two bins of
+///            one cycle per period: that is a transient
 /// Errors:    false if memory is short; fewer than two consecutive periods: nothing is found
 /// Test:      tests/unit/test_oscillation.c
 bool oscillation_measure(const struct periodic *recording, struct oscillation *out);

@@ -15,6 +15,7 @@ enum {
     quick_iterations = 20,
     rounds_max = 3,
     delay_starts_max = 64,
+    delay_starts_few = 8, // around a delay that is known
     delay_starts_refined = 3,
     delay_iterations = 6,
     delay_levels = 4,
@@ -85,7 +86,7 @@ static void zoom(const struct parametric_problem *problem, double spacing_s, str
 
 /// With a free delay there is a minimum about every half period of the fastest line: starts on a grid, a few steps
 /// each, then the best ones to their end.
-static void search_delays(const struct parametric_problem *problem, struct attempt *out_best)
+static void search_delays(const struct parametric_problem *problem, bool quick, struct attempt *out_best)
 {
     const struct parametric_structure *structure = &problem->structure;
     double fastest_hz = 0.0;
@@ -104,7 +105,7 @@ static void search_delays(const struct parametric_problem *problem, struct attem
         begin_attempt(problem, delay_s, NULL, delay_iterations, &attempts[i]);
     }
     qsort(attempts, count, sizeof *attempts, by_cost);
-    size_t refined = count < delay_starts_refined ? count : delay_starts_refined;
+    size_t refined = quick || count <= delay_starts_few ? 1 : delay_starts_refined;
     for (size_t i = 0; i < refined && isfinite(attempts[i].outcome.cost); i++) {
         zoom(problem, 0.5 * limit_s / fmax(steps, 1.0), &attempts[i]);
         refine(problem, iterations_max, &attempts[i]);
@@ -139,7 +140,7 @@ static bool search(const struct parametric_problem *problem, const struct parame
         parametric_pack(start, out_best->theta);
         refine(problem, iterations, out_best);
     } else if (problem->structure.delay_free) {
-        search_delays(problem, out_best);
+        search_delays(problem, quick, out_best);
     } else {
         begin_attempt(problem, problem->structure.delay_s, NULL, iterations, out_best);
     }

@@ -10,7 +10,7 @@
 enum { distortion_lines = 11, window_max = 21 };
 
 static const double enough_dof = 20.0;
-static const double beyond_chance = 3.0;
+static const double beyond_chance = 4.0;
 
 /// The input's noise over its power below which it may be taken for noise of the output: the response is drawn towards
 /// 0 by no larger share.

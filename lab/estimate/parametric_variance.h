@@ -18,7 +18,7 @@ struct parametric_weights {
 /// Raises io_data->variance_dof accordingly. Returns the number of lines that are pooled, 1: none.
 ///
 /// Alike:  log s^2 of v degrees of freedom has the variance psi'(v). Within groups of as many lines it must not be
-///         larger beyond chance (three standard deviations, allowing for the kurtosis psi'''(v) / psi'(v)^2)
+///         larger beyond chance (four standard deviations, allowing for the kurtosis psi'''(v) / psi'(v)^2)
 /// Loops:  where output or input by itself does not scatter alike, but Y - G U does, as in a closed loop, that is
 ///         pooled
 ///         and counted as the output's, if the input's noise is below a thousandth of its power at every line

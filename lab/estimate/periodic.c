@@ -15,6 +15,8 @@
 
 /// Rounding of sums and transforms against the largest number that takes part in them, with a margin.
 static const double rounding = 1e-12;
+/// Lines that hold less of the input's RMS than this hold what writing it with a few digits leaves.
+static const double nothing_of_signal = 1e-6;
 /// A ramp's own numbers may have been rounded to a few digits.
 static const double rounding_of_ramp = 1e-6;
 
@@ -199,6 +201,22 @@ static void choose_settle(struct periodic *self, const struct periodic_options *
     }
 }
 
+/// Lost rows that no period pays for: they are in what is left out anyway.
+static void count_lost_outside(struct periodic *self)
+{
+    const size_t rows = self->run->rows;
+    const size_t settled = self->settle < self->total ? self->settle * self->period_samples : rows;
+    const size_t end = self->total * self->period_samples;
+    size_t row = columns_first_lost_row(self->run, 0, rows);
+    while (row > 0) {
+        if (row <= settled || row > end) {
+            self->first_lost_outside = self->lost_outside == 0 ? row : self->first_lost_outside;
+            self->lost_outside++;
+        }
+        row = columns_first_lost_row(self->run, row, rows - row);
+    }
+}
+
 static int select_periods(struct periodic *self, const bool *usable, struct error *out_error)
 {
     self->used_periods = malloc(self->total * sizeof *self->used_periods);
@@ -213,6 +231,7 @@ static int select_periods(struct periodic *self, const bool *usable, struct erro
             self->lost++;
         }
     }
+    count_lost_outside(self);
     if (self->used >= 2) {
         return 0;
     }
@@ -338,6 +357,35 @@ static int refuse_silence(const struct periodic *self, size_t strongest, double 
                      magnitude * to_amplitude, limit * to_amplitude);
 }
 
+/// RMS of the input in the first period that counts, without its mean.
+static double rms_of_input(const struct periodic *self, double sum)
+{
+    const double length = (double)self->period_samples;
+    const double *x = run_column(self->run, self->input) + self->used_periods[0] * self->period_samples;
+    double square = 0.0;
+    for (size_t n = 0; n < self->period_samples; n++) {
+        square += (x[n] - sum / length) * (x[n] - sum / length);
+    }
+    return sqrt(square / length);
+}
+
+/// Lines that were said, of which the input holds nothing.
+static int check_lines(const struct periodic *self, size_t strongest, double magnitude, double rms,
+                       struct error *out_error)
+{
+    const double length = (double)self->period_samples;
+    const double amplitude = 2.0 * magnitude / length;
+    if (self->bins_found || !(amplitude < nothing_of_signal * rms)) {
+        return 0;
+    }
+    return error_set(out_error, error_refused,
+                     "%s: %s has no power on any of %zu lines: the strongest, %.6g Hz, has an amplitude of %.2g "
+                     "(%.0f dB of its RMS, %.3g): expected the lines that are excited, see --lines, --input",
+                     self->run->path, self->input, self->bin_count,
+                     (double)self->bins[strongest] * self->run->sample_rate_hz / length, amplitude,
+                     20.0 * log10(fmax(amplitude / rms, 1e-20)), rms);
+}
+
 /// What rounding makes of a constant or a ramp is the same in all periods: scatter does not tell it from a line.
 static int check_power(struct periodic *self, struct error *out_error)
 {
@@ -350,6 +398,9 @@ static int check_power(struct periodic *self, struct error *out_error)
         mean_input(self, sums, mean, limit);
         if (silence_lines(self, mean, limit, &strongest) == 0) {
             status = refuse_silence(self, strongest, cabs(mean[strongest]), limit[strongest], out_error);
+        } else {
+            const double rms = rms_of_input(self, creal(sums[0]));
+            status = check_lines(self, strongest, cabs(mean[strongest]), rms, out_error);
         }
     }
     free(sums);
@@ -426,6 +477,24 @@ bool periodic_transform_used(const struct periodic *self, const char *column, do
         }
     }
     return true;
+}
+
+double periodic_first_level(const struct periodic *self)
+{
+    size_t p = 0;
+    while (p + 1 < self->total && isnan(self->output_level[p])) {
+        p++;
+    }
+    return self->output_level[p];
+}
+
+double periodic_last_level(const struct periodic *self)
+{
+    size_t p = self->total - 1;
+    while (p > 0 && isnan(self->output_level[p])) {
+        p--;
+    }
+    return self->output_level[p];
 }
 
 void periodic_free(struct periodic *self)

@@ -49,14 +49,16 @@ struct periodic {
     size_t doubtful_count;
     size_t total; ///< whole periods in the recording
     enum periodic_settle settle_source;
-    size_t settle;           ///< leading periods left out for settling
-    size_t lost;             ///< later periods left out because samples of theirs were lost
-    size_t first_lost_row;   ///< of those, counted from 1
-    size_t used;             ///< periods that count, at least 2
-    size_t *used_periods;    ///< their numbers, ascending, from 0
-    double trend_per_sample; ///< drift of an integrating output (a position), taken out; 0 for other outputs
-    struct settle transient; ///< the longer of input and output
-    double *input_level;     ///< `total` values: transient and scatter of each period, share of the signal
+    size_t settle;         ///< leading periods left out for settling
+    size_t lost;           ///< later periods left out because samples of theirs were lost
+    size_t first_lost_row; ///< of those, counted from 1
+    size_t lost_outside;   ///< lost rows that cost no period: left out for settling, or behind the last whole period
+    size_t first_lost_outside; ///< of those, counted from 1
+    size_t used;               ///< periods that count, at least 2
+    size_t *used_periods;      ///< their numbers, ascending, from 0
+    double trend_per_sample;   ///< drift of an integrating output (a position), taken out; 0 for other outputs
+    struct settle transient;   ///< the longer of input and output
+    double *input_level;       ///< `total` values: transient and scatter of each period, share of the signal; NaN: lost
     double *output_level;
     double complex *input_spectra; ///< used x bin_count (spectra.h)
     double complex *output_spectra;
@@ -78,6 +80,10 @@ int periodic_cut(const struct run *run, const struct periodic_options *options, 
 /// Transforms the periods that count of another column; out_spectra: used x bin_count. Errors: false if memory is
 /// short.
 bool periodic_transform_used(const struct periodic *self, const char *column, double complex *out_spectra);
+
+/// output_level of the first and of the last period without lost samples.
+double periodic_first_level(const struct periodic *self);
+double periodic_last_level(const struct periodic *self);
 
 void periodic_free(struct periodic *self);
 

@@ -168,12 +168,13 @@ static void judge(const struct comparison *compared, const struct totals *totals
     bool leading = true;
     for (size_t p = 0; p < periods; p++) {
         const struct comparison *period = &compared[p];
-        out_level[p] = totals->signal > 0.0 ? sqrt(period->deviation / totals->signal) : 0.0;
+        const double level = totals->signal > 0.0 ? sqrt(period->deviation / totals->signal) : 0.0;
+        out_level[p] = usable[p] ? level : NAN;
         if (p < 2 && usable[p] && period->deviation > measurable * totals->scatter) {
             excess[p] = period->deviation - totals->scatter;
         }
         leading = leading && p < periods / 2 && (!usable[p] || is_unsettled(period, bin_count));
-        out_settle->periods += leading;
+        out_settle->periods = leading && usable[p] ? p + 1 : out_settle->periods;
     }
     out_settle->settled = out_settle->periods < periods / 2;
     if (excess[0] > 0.0 && excess[1] > 0.0) {
@@ -187,7 +188,7 @@ bool settle_measure(const double complex *spectra, size_t periods, size_t bin_co
     struct totals totals = {0};
     *out_settle = (struct settle){0};
     for (size_t p = 0; p < periods; p++) {
-        out_level[p] = 0.0;
+        out_level[p] = usable[p] ? 0.0 : NAN;
         totals.count += p >= periods / 2 && usable[p];
     }
     if (periods < fewest_periods || totals.count < 2 || bin_count == 0) {

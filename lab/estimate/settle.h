@@ -19,7 +19,8 @@ struct settle {
 ///            the chances P of all lines combine after Fisher: -2 sum log P ~ chi2(2K). Left out while below 1e-3.
 ///
 /// Shapes:    spectra: periods x bin_count; usable: periods (false: has lost samples, taken as settled, not looked at);
-///            out_level: periods, root of the lines' summed |Y_p - Ybar|^2 over that of the lines' |Ybar|^2
+///            out_level: periods, root of the lines' summed |Y_p - Ybar|^2 over that of the lines' |Ybar|^2,
+///            NaN for what is not usable
 /// Errors:    false if memory is short; under 4 periods, or fewer than 2 usable ones in the later half: periods = 0,
 ///            settled = false
 /// Test:      tests/unit/test_settle.c

@@ -313,10 +313,42 @@ static int check_steps(const struct run_checks *self, const struct text_table *t
     return error_none;
 }
 
+/* A lost row's time may be anything: it is put between its neighbours' before the steps are judged. */
+static void mend_time(const struct run_checks *self, const struct text_table *table, const double *valid,
+                      size_t first_row)
+{
+    double *time_s = table->columns[self->time_column].data;
+    double before = self->rows > 0 ? self->last_s : NAN;
+    double step = self->step_s;
+    for (size_t n = first_row; n < table->rows; n++) {
+        size_t end = n;
+        while (end < table->rows && valid[end] == 0)
+            end++;
+        if (end > n) {
+            const double count = (double)(end - n);
+            if (end < table->rows && isfinite(before))
+                step = (time_s[end] - before) / (count + 1.0);
+            if (!isfinite(before) && end + 1 < table->rows && valid[end + 1] != 0)
+                step = time_s[end + 1] - time_s[end];
+            if (!isfinite(before) && end < table->rows)
+                before = time_s[end] - (count + 1.0) * step;
+            for (size_t row = n; row < end && step > 0 && isfinite(before); row++)
+                time_s[row] = before + (double)(row - n + 1) * step;
+            n = end - 1;
+        } else if (isfinite(before)) {
+            step = time_s[n] - before;
+        }
+        before = time_s[n];
+    }
+}
+
 static int check_time(struct run_checks *self, const struct text_table *table, const struct run *run, size_t first_row,
                       struct error *out_error)
 {
     const double *time_s = table->columns[self->time_column].data;
+    size_t valid;
+    if (find_column(run, "valid", &valid))
+        mend_time(self, table, table->columns[valid].data, first_row);
     int status = check_order(self, table, first_row, out_error);
     if (!status && self->step_s == 0 && self->rows + table->rows - first_row > 1) {
         double median = median_step(self, time_s, first_row, table->rows);

@@ -24,7 +24,8 @@ static struct trend find_trend(const struct tune_plant *plant, const double comp
     }
     double phase = 0.0;
     for (size_t k = first; k < last; k++) {
-        phase += carg(response[k + 1] / response[k]);
+        const double turn = tune_plant_known_turn(plant, f[k], f[k + 1]);
+        phase += carg(response[k + 1] / response[k] * cexp(-I * turn)) + turn;
     }
     return (struct trend){true, log(cabs(response[last] / response[first])) / log(f[last] / f[first]),
                           phase / (f[last] - f[first])};

@@ -40,8 +40,10 @@ static struct sight look(const struct tune_plant *plant, const double complex *r
         return (struct sight){false, fmax(cabs(response[low]), cabs(response[high])), plant->std[low]};
     }
     const double share = (frequency_hz - f[low]) / (f[high] - f[low]);
-    return (struct sight){true, response[low] * cexp(share * clog(response[high] / response[low])),
-                          fmax(plant->std[low], plant->std[high])};
+    // What was put back turns by a known angle, of which the lines show no full turns.
+    const double turn = -2.0 * pi * (f[high] - f[low]) * plant->delay_removed_s;
+    const double complex step = clog(response[high] / response[low] * cexp(-I * turn)) + I * turn;
+    return (struct sight){true, response[low] * cexp(share * step), fmax(plant->std[low], plant->std[high])};
 }
 
 /// One line of a controller that is `slower` times slower than the recording.

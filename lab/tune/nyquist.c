@@ -98,23 +98,85 @@ static bool check_ends(const struct tune_plant *plant, const double complex *res
     return false;
 }
 
+/// Whether the lines show the turns of the known delay: delay times spacing stays at half of what would be ambiguous.
+static bool check_delay(const struct tune_plant *plant, const double complex *loop, struct nyquist *io_nyquist)
+{
+    const double turns_most = 0.25, delay_s = fabs(plant->loop_delay_s);
+    double below_hz = 0.0, below = INFINITY;
+    for (size_t k = 0; k < plant->count; k++) {
+        const double step_hz = plant->frequency_hz[k] - below_hz, larger = fmax(below, cabs(loop[k]));
+        if (!(step_hz * delay_s <= turns_most) && larger > gain_that_matters) {
+            give_up(io_nyquist,
+                    "the loop's known delay of %.4g s turns the open loop by %.2f turns from %.6g to %.6g Hz, where it "
+                    "is at %.1f dB, and lines that far apart do not show them: expected lines at most %.3g Hz apart "
+                    "up to where it is below %.0f dB%s, or less delay",
+                    delay_s, step_hz * delay_s, below_hz, plant->frequency_hz[k], decibel(cabs(loop[k])),
+                    turns_most / delay_s, decibel(gain_that_matters), k == 0 ? " and from 0 Hz on" : "");
+            return false;
+        }
+        below_hz = plant->frequency_hz[k];
+        below = cabs(loop[k]);
+    }
+    return true;
+}
+
+static bool is_noisy(const struct tune_plant *plant, const double complex *response, size_t k)
+{
+    return plant->confidence_factor *
+               fmax(plant->std[k] / cabs(response[k]), plant->std[k + 1] / cabs(response[k + 1])) >
+           0.5;
+}
+
+/// The step of L's phase to the next line, on the branch that the known delay says.
+static double find_step(const struct tune_plant *plant, const double complex *curve, size_t k)
+{
+    const double turn = tune_plant_known_turn(plant, plant->frequency_hz[k], plant->frequency_hz[k + 1]);
+    return carg(curve[k + 1] / curve[k] * cexp(-I * turn)) + turn;
+}
+
+/// A drive's phase rises by 180 degrees at most before it falls again. A delay that turns by more than half a turn from
+/// line to line seems to lead, on and on.
+static bool check_rise(const struct tune_plant *plant, const double complex *response, const double complex *loop,
+                       struct nyquist *io_nyquist)
+{
+    const double rise_most = 1.5 * pi;
+    double rise = 0.0, from_hz = plant->frequency_hz[0];
+    for (size_t k = 0; k + 1 < plant->count; k++) {
+        const bool seen = fmin(cabs(loop[k]), cabs(loop[k + 1])) > gain_that_matters && !is_noisy(plant, response, k);
+        rise = seen ? rise + find_step(plant, response, k) : 0.0;
+        if (!(rise > 0.0)) {
+            rise = 0.0;
+            from_hz = plant->frequency_hz[k + 1];
+        }
+        if (rise > rise_most) {
+            give_up(io_nyquist,
+                    "from %.6g to %.6g Hz the response's phase rises by %.0f degrees, as no drive's does (180 at "
+                    "most): it turns the other way round by more than half a turn from line to line, as with a delay "
+                    "above %.3g s; expected denser lines (a longer period)",
+                    from_hz, plant->frequency_hz[k + 1], rise * degrees,
+                    0.5 / (plant->frequency_hz[k + 1] - plant->frequency_hz[k]));
+            return false;
+        }
+    }
+    return true;
+}
+
 /// Whether the curve between two lines is known well enough to count its turns.
 static bool check_step(const struct tune_plant *plant, const double complex *response, const double complex *loop,
                        size_t k, struct nyquist *io_nyquist)
 {
     const double turn = carg((1.0 + loop[k + 1]) / (1.0 + loop[k]));
-    const double lag = carg(loop[k + 1] / loop[k]);
-    const double size = fmax(cabs(loop[k]), cabs(loop[k + 1]));
-    const double noise =
-        plant->confidence_factor * fmax(plant->std[k] / cabs(response[k]), plant->std[k + 1] / cabs(response[k + 1]));
-    const bool noisy = noise > 0.5;
-    if (fabs(turn) <= 0.5 * pi && !(lag < -0.5 * pi && size > gain_that_matters && !noisy)) {
+    const double step = find_step(plant, loop, k), gain_that_leads = 0.5;
+    const double larger = fmax(cabs(loop[k]), cabs(loop[k + 1])), smaller = fmin(cabs(loop[k]), cabs(loop[k + 1]));
+    const bool lags = step < -0.5 * pi && larger > gain_that_matters;
+    const bool leads = step > 0.5 * pi && smaller > gain_that_leads; // or lags by 180 to 270 degrees
+    if (fabs(turn) <= 0.5 * pi && !((lags || leads) && !is_noisy(plant, response, k))) {
         return true;
     }
     give_up(io_nyquist,
             "between the lines at %.6g and %.6g Hz the open loop turns by %.0f degrees (seen from -1 by %.0f): a "
-            "resonance may hide there, expected denser lines",
-            plant->frequency_hz[k], plant->frequency_hz[k + 1], lag * degrees, turn * degrees);
+            "resonance or delay may hide there, expected denser lines",
+            plant->frequency_hz[k], plant->frequency_hz[k + 1], step * degrees, turn * degrees);
     return false;
 }
 
@@ -189,6 +251,14 @@ static void state_assumptions(const struct tune_plant *plant, struct nyquist *io
     snprintf(io_nyquist->assumptions[2], size,
              "above %.4g Hz, the highest line, the open loop's gain (%.1f dB there) does not rise above 0 dB",
              plant->frequency_hz[plant->count - 1], io_nyquist->last_gain_db);
+    double spacing_hz = INFINITY;
+    for (size_t k = 0; k + 1 < plant->count; k++) {
+        spacing_hz = fmin(spacing_hz, plant->frequency_hz[k + 1] - plant->frequency_hz[k]);
+    }
+    snprintf(io_nyquist->assumptions[4], size,
+             "the measured response has no delay near %.3g s or more, 1 over the spacing of its lines: they would not "
+             "show its turns",
+             1.0 / spacing_hz);
     const double lower_end_hz = gap_lower_end_hz(plant);
     const int used =
         snprintf(io_nyquist->assumptions[3], size,
@@ -206,7 +276,8 @@ void nyquist_judge(const struct tune_plant *plant, const double complex *respons
     *out_nyquist = (struct nyquist){.verdict = nyquist_undecided};
     find_worst(plant, loop, out_nyquist);
     state_assumptions(plant, out_nyquist);
-    if (!check_hold(plant, controller, out_nyquist) || !check_ends(plant, response, loop, out_nyquist)) {
+    if (!check_hold(plant, controller, out_nyquist) || !check_delay(plant, loop, out_nyquist) ||
+        !check_ends(plant, response, loop, out_nyquist)) {
         return;
     }
     // Terms with gains >= 0 stay within 90 degrees of each other, and a biquad's phase within 180, so the controller's
@@ -222,6 +293,9 @@ void nyquist_judge(const struct tune_plant *plant, const double complex *respons
             return;
         }
         phase += carg((1.0 + loop[k + 1]) / (1.0 + loop[k]));
+    }
+    if (!check_rise(plant, response, loop, out_nyquist)) {
+        return;
     }
     if (measured && !check_noise(plant, response, loop, out_nyquist)) {
         return;

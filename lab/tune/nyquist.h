@@ -9,7 +9,7 @@
 #include <complex.h>
 #include <stdbool.h>
 
-enum { nyquist_assumptions = 4 };
+enum { nyquist_assumptions = 5 };
 
 enum nyquist_verdict { nyquist_stable, nyquist_unstable, nyquist_undecided };
 
@@ -33,8 +33,11 @@ struct nyquist {
 /// - all gains but the derivative's are 0: nothing holds the drive at 0 Hz;
 /// - |L| is below 2 at the lowest line or above 1/2 at the highest: the turns beyond them would be guesses;
 /// - the plant's phase at the lowest line is not that of a drive (a sign that is wrong);
-/// - 1 + L turns by more than 90 degrees between two lines, or L lags by 90 degrees more where |L| > 0.1: a resonance
-///   may hide there;
+/// - the known delay turns L by more than 90 degrees between two lines where |L| > 0.1, or below the lowest line: full
+///   turns do not show on the lines;
+/// - 1 + L turns by more than 90 degrees between two lines, or L lags by 90 degrees more where |L| > 0.1, or leads by 90
+///   degrees more where |L| > 0.5: a resonance or delay may hide there;
+/// - the plant's phase rises by more than 270 degrees where |L| > 0.1: the lines show a delay's turns backwards;
 /// - `measured`, and a resonance between two lines could bring L to -1 without showing on them (lab/tune/gap.h);
 /// - `measured`, and -1 lies in the 95 % circle of a line, or within the plant's doubt: noise decides.
 /// `measured` is false for a response that is drawn from a measured one, whose lines have been judged.

@@ -256,6 +256,7 @@ int tune_plant_take(const char *path, const struct frf *frf, double rate_hz, dou
     *out_plant = (struct tune_plant){0};
     int status = find_number(path, frf, "delay_removed_s", "a number of seconds", false, &removed_s, out_error);
     out_plant->loop_delay_s = loop_delay_s + removed_s;
+    out_plant->delay_removed_s = removed_s;
     status = status ? status : find_units(path, frf, out_plant, out_error);
     status = status ? status : find_rates(path, frf, rate_hz, out_plant, out_error);
     status = status ? status : fill_in(path, frf, removed_s, loop_delay_s, out_plant, out_error);
@@ -263,6 +264,11 @@ int tune_plant_take(const char *path, const struct frf *frf, double rate_hz, dou
         tune_plant_free(out_plant);
     }
     return status;
+}
+
+double tune_plant_known_turn(const struct tune_plant *self, double from_hz, double to_hz)
+{
+    return -two_pi * (to_hz - from_hz) * self->loop_delay_s;
 }
 
 void tune_plant_free(struct tune_plant *self)

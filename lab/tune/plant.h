@@ -32,7 +32,8 @@ struct tune_plant {
     double *left_out_hz;      ///< those of them that are not valid below half the rate, ascending
     size_t left_out;
     char doubt_from[tune_doubt_size]; ///< "" where there is no doubt
-    double loop_delay_s;
+    double loop_delay_s;              ///< known delay in `response`: the caller's and what was put back
+    double delay_removed_s;           ///< what was put back
     enum tune_output output;
     const char *effort_unit; ///< of the controller's output: Nm, N, A, V
     const char *length_unit; ///< rad or m
@@ -49,6 +50,11 @@ struct tune_plant {
 /// Test:   tests/unit/test_tune_plant.c
 int tune_plant_take(const char *path, const struct frf *frf, double rate_hz, double loop_delay_s,
                     struct tune_plant *out_plant, struct error *out_error);
+
+/// Returns by how far the known delay turns the response from one frequency to another, in radians, below 0 for a lag:
+/// exact, where neighbouring lines show it but for full turns.
+/// Equation:  -2 pi (to - from) loop_delay_s
+double tune_plant_known_turn(const struct tune_plant *self, double from_hz, double to_hz);
 
 /// Frees what tune_plant_take() gave; harmless on a zeroed struct.
 void tune_plant_free(struct tune_plant *self);

@@ -128,10 +128,10 @@ static int refuse(const char *path, const struct tune_result *self, const struct
     if (!has_gain(&self->solution.controller)) {
         return error_set(out_error, error_refused,
                          "%s: every gain of the %s controller would be negative: expected a response with the sign of "
-                         "its input (does the %s count the other way round? frf --map NAME=COLUMN*-1), or a reference "
-                         "with more delay",
-                         path, options->structure,
-                         self->plant.output == tune_output_velocity ? "velocity" : "position");
+                         "its input (does the %s count the other way round? frf --map NAME=COLUMN*-1), less delay in "
+                         "the loop (%.4g s are known) or a reference with more delay",
+                         path, options->structure, self->plant.output == tune_output_velocity ? "velocity" : "position",
+                         self->plant.loop_delay_s);
     }
     say_gains(&self->plant, &self->solution.controller, gains);
     advise(self, options, advice);

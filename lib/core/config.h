@@ -46,6 +46,31 @@
 #error "SERVOSCOPE_FRF_BLOCK: 8 .. 1024 samples"
 #endif
 
+/// Whether the core multiplies 32 by 32 bits to 64 in one instruction. 0 (Cortex-M0, M0+, M23): the exact DFT with Q15
+/// factors goes another way to the same sums, and frf_block_choose() keeps to it.
+#ifndef SERVOSCOPE_FRF_LONG_MULTIPLY
+#if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)
+#define SERVOSCOPE_FRF_LONG_MULTIPLY 0
+#else
+#define SERVOSCOPE_FRF_LONG_MULTIPLY 1
+#endif
+#endif
+#if SERVOSCOPE_FRF_LONG_MULTIPLY != 0 && SERVOSCOPE_FRF_LONG_MULTIPLY != 1
+#error "SERVOSCOPE_FRF_LONG_MULTIPLY: 0 or 1"
+#endif
+
+/// Whether the exact DFT with Q15 factors uses the loop written for ARMv6-M, or portable C with the same results.
+#ifndef SERVOSCOPE_FRF_ARMV6M
+#if defined(__ARM_ARCH_6M__) && defined(__GNUC__)
+#define SERVOSCOPE_FRF_ARMV6M 1
+#else
+#define SERVOSCOPE_FRF_ARMV6M 0
+#endif
+#endif
+#if SERVOSCOPE_FRF_ARMV6M != 0 && SERVOSCOPE_FRF_ARMV6M != 1
+#error "SERVOSCOPE_FRF_ARMV6M: 0 or 1"
+#endif
+
 /// Whether the block DFT uses the kernel of cores with ARMv7E-M's rounding high multiplies (Cortex-M4, M7), or portable
 /// C with the same results. Off by itself where the core or the compiler is another one.
 #ifndef SERVOSCOPE_FRF_ARMV7EM

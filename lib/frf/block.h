@@ -27,10 +27,12 @@
     (2u * FRF_BLOCK_ROWS(bins) * (channels) * (banks) + (terms) * (channels) + ((terms) == (L) ? 0u : (L)))
 CORE_STATIC_ASSERT(FRF_BLOCK_STORAGE_WORDS(200u, 3u, 1u, 32u, 32u) * 4u == 200u * 3u * 8u + 3u * 128u,
                    eight_bytes_a_bin_and_channel);
-/// Samples of int16_t: the block being filled.
-#define FRF_BLOCK_FRAME_SAMPLES(channels, L) ((channels) * (L))
+/// Samples of int16_t for the block being filled; none if the period is folded.
+#define FRF_BLOCK_FRAME_SAMPLES(channels, L)    ((channels) * (L))
+/// Words of int32_t for a period of N samples folded into N/Q, whole blocks; none if it is not folded.
+#define FRF_BLOCK_PART_WORDS(channels, N, Q, L) ((channels) * (((N) / (Q) + (L)-1u) / (L) * (L)))
 
-/// What the two ends need to agree on. storage, frames and what the table points to must outlive the object.
+/// What the two ends need to agree on. storage, frames, part and what the table points to must outlive the object.
 struct frf_block_config {
     const struct frf_block_table *table;
     uint32_t channels; ///< 1 .. SERVOSCOPE_FRF_CHANNELS_MAX
@@ -38,8 +40,10 @@ struct frf_block_config {
     bool spread;       ///< work on a block while the next one arrives, evenly
     int32_t *storage;  ///< FRF_BLOCK_STORAGE_WORDS(bins, channels, banks, L, terms) words, not initialised
     uint32_t storage_words;
-    int16_t *frames; ///< FRF_BLOCK_FRAME_SAMPLES(channels, L) samples, not initialised
+    int16_t *frames; ///< FRF_BLOCK_FRAME_SAMPLES(channels, L) samples, not initialised; unused if repeats > 1
     uint32_t frame_samples;
+    int32_t *part; ///< FRF_BLOCK_PART_WORDS(channels, N, Q, L) words, not initialised; unused if repeats <= 1
+    uint32_t part_words;
     int16_t rail_low, rail_high; ///< samples at or beyond count as saturated; both 0: INT16_MIN and INT16_MAX
 };
 
@@ -49,11 +53,15 @@ struct frf_block {
     int32_t *banks[2]; ///< accumulators: channel by channel, real and imaginary of each row; the same one twice, or two
     int32_t *work;     ///< what the bins are multiplied with, channel by channel
     int32_t *folded;   ///< before projection; null without a basis
-    int16_t *frames;   ///< of the block being filled
+    int16_t *frames;   ///< of the block being filled; or
+    int32_t *part;     ///< the folded period; null without
     uint32_t bank_count, channels;
     bool spread;
     int16_t rail_low, rail_high;
-    uint32_t position;           ///< n of the next sample, 0 .. N-1
+    uint32_t repeat;             ///< part of the period that is being folded in
+    uint32_t block_start;        ///< n of the first frame of the block being filled, within the part
+    uint32_t block_frames, left; ///< frames of that block, and those still to come
+    uint32_t lost;               ///< frames of that block, its first, that were lost
     uint32_t done;               ///< pairs of rows, of all channels, that have the vector in `work`
     bool fresh;                  ///< no block of this period has been worked on yet
     bool work_fresh, work_last;  ///< the block in `work` is its period's first to be worked on, its last
@@ -104,7 +112,7 @@ bool frf_block_latest(const struct frf_block *self, struct frf_block_period *out
 /// Whether what was read from the period since frf_block_latest() can be trusted: its bank is not being written to.
 bool frf_block_is_intact(const struct frf_block *self, const struct frf_block_period *period);
 
-/// Sum over the period of y[n] cos and of -y[n] sin at a bin, times 2^(31 + gain_shift of the table).
+/// Sum over the period of y[n] cos and of -y[n] sin at a bin, times 2^(30 + gain_shift of the table).
 void frf_block_sums(const struct frf_block *self, const struct frf_block_period *period, uint32_t bin, uint32_t channel,
                     int64_t *out_real, int64_t *out_imaginary);
 

@@ -17,6 +17,8 @@ struct tridiagonal {
 
 static void fill(struct tridiagonal *self, uint32_t half, double width, int sign)
 {
+    struct tridiagonal zero = {{0.0}, {0.0}, 0};
+    *self = zero;
     static const double two_pi = 6.28318530717958647692;
     self->size = half;
     for (uint32_t t = 0; t < half; ++t) {
@@ -93,7 +95,7 @@ static void eigenvector(const struct tridiagonal *matrix, double value, double *
 void frf_basis_function(uint32_t half, double width, int sign, uint32_t order, double *out_function)
 {
     struct tridiagonal matrix;
-    double vector[half_max], squares = 0.0;
+    double vector[half_max] = {0.0}, squares = 0.0;
     fill(&matrix, half, width, sign);
     eigenvector(&matrix, eigenvalue(&matrix, order), vector);
     for (uint32_t t = 0; t < half; ++t) {

@@ -24,19 +24,26 @@ static inline uint32_t subtract_product(uint32_t sum, int32_t a, int32_t b)
     return sum + high_word(-((int64_t)a * b));
 }
 
+/* value / 16, rounded down */
+static inline uint32_t sixteenth(uint32_t value)
+{
+    return value >> 4 | (value >> 31) * 0xF0000000u;
+}
+
 static void accumulate_row(int32_t *accumulator, const int32_t *rotation, const int32_t *factors, const int32_t *data,
                            uint32_t groups)
 {
-    int32_t cosine = rotation[0], sine = rotation[1];
-    uint32_t real = add_product(0, accumulator[0], cosine), imaginary = add_product(0, accumulator[0], sine);
-    real = 2u * subtract_product(real, accumulator[1], sine);
-    imaginary = 2u * add_product(imaginary, accumulator[1], cosine);
+    uint32_t real = 8u, imaginary = 8u;
     for (uint32_t g = 0; g < groups; ++g) {
         real = add_product(real, data[4u * g], factors[8u * g]);
         imaginary = add_product(imaginary, data[4u * g + 1u], factors[8u * g + 1u]);
         real = add_product(real, data[4u * g + 2u], factors[8u * g + 2u]);
         imaginary = add_product(imaginary, data[4u * g + 3u], factors[8u * g + 3u]);
     }
+    int32_t cosine = rotation[0], sine = rotation[1];
+    int32_t real_2 = as_signed(2u * (uint32_t)accumulator[0]), imaginary_2 = as_signed(2u * (uint32_t)accumulator[1]);
+    real = subtract_product(add_product(0, real_2, cosine), imaginary_2, sine) + sixteenth(real);
+    imaginary = add_product(add_product(0, real_2, sine), imaginary_2, cosine) + sixteenth(imaginary);
     accumulator[0] = as_signed(real);
     accumulator[1] = as_signed(imaginary);
 }
@@ -45,8 +52,8 @@ void frf_block_accumulate_portable(int32_t *accumulators, const int32_t *rows, c
                                    uint32_t groups)
 {
     for (uint32_t p = 0; p < row_pairs; ++p) {
-        const int32_t *row = rows + p * (4u + 8u * groups);
-        accumulate_row(accumulators + 4u * p, row, row + 4, data, groups);
-        accumulate_row(accumulators + 4u * p + 2u, row + 2, row + 8, data, groups);
+        const int32_t *row = rows + p * (8u * groups + 4u);
+        accumulate_row(accumulators + 4u * p, row + 8u * groups, row, data, groups);
+        accumulate_row(accumulators + 4u * p + 2u, row + 8u * groups + 2, row + 4, data, groups);
     }
 }

@@ -9,12 +9,17 @@
 
 /// Rotates accumulators and adds a block's contribution, two rows at a time:
 ///
-///     re <- 2 (re c - im s) + sum_i data[2i] a_i,    im <- 2 (re s + im c) + sum_i data[2i+1] b_i
+///     re <- re c - im s + R/16,    R = 8 + sum_i data[2i] a_i / 2
+///     im <- re s + im c + I/16,    I = 8 + sum_i data[2i+1] b_i / 2
 ///
-/// where every product is the upper word of a 64-bit one, rounded (halves upwards) as it joins its sum, and all sums
-/// are modulo 2^32. c, s, a, b are Q31, so a product is half of what its factors say: the rotation's two are doubled.
-/// Layout of two rows: c s | c s, then for every two i: a b a b of the first row, a b a b of the second.
-/// Shapes: accumulators 4 row_pairs words; rows row_pairs (4 + 8 groups) words; data 4 groups words; all at least 1
+/// c, s, a, b are Q31. Every product is the upper word of a 64-bit one (of 2 re and 2 im in the rotation), rounded
+/// (halves upwards) as it joins its sum; R/16 and I/16 are rounded down, so that with the 8 they too are rounded; all
+/// sums are modulo 2^32. The block's own sum is kept finer than the accumulator, or its L roundings would be most of
+/// the noise; the rotation has the accumulator's own grid, or it would be coarser than what is rotated, and a rotation
+/// by nothing a leak.
+/// Layout of two rows: for every two i a b a b of the first row, a b a b of the second; then c s | c s.
+/// Shapes: accumulators 4 row_pairs words, |re|, |im| < 2^30; rows row_pairs (8 groups + 4) words; data 4 groups words;
+///         row_pairs and groups at least 1
 typedef void frf_block_kernel(int32_t *accumulators, const int32_t *rows, const int32_t *data, uint32_t row_pairs,
                               uint32_t groups);
 

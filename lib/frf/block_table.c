@@ -10,10 +10,11 @@
 
 enum { half_max = FRF_BLOCK_SAMPLES_MAX / 2u };
 
-/* A function of the basis has unit RMS; a quarter of that keeps its peaks below 1 in Q31. */
+/* Of a function of unit RMS: keeps most peaks below 1 in Q31. */
 static const double basis_scale = 0.25;
-/* What of a line lies outside the basis falls on bins N/L apart: -108 dB of a line, as the products' rounding. */
-static const double basis_error_max = 4e-6;
+/* RMS of what a line has outside the basis. Of signals that lie in it too that only passes with the square; 1e-4 is what
+ * comes through of anything above the lines, at bins N/L apart (-80 dB). */
+static const double basis_error_max = 1e-4;
 
 static int32_t q31(double value)
 {
@@ -24,12 +25,12 @@ static int32_t q31(double value)
 /* Where the kernel looks for rotation and factor `term` of a row. */
 static int32_t *rotation_of(int32_t *rows, uint32_t terms, uint32_t row)
 {
-    return rows + row / 2u * (4u + 2u * terms) + row % 2u * 2u;
+    return rows + row / 2u * (4u + 2u * terms) + 2u * terms + row % 2u * 2u;
 }
 
 static int32_t *factor_of(int32_t *rows, uint32_t terms, uint32_t row, uint32_t term)
 {
-    return rows + row / 2u * (4u + 2u * terms) + 4u + term / 4u * 8u + row % 2u * 4u + term % 4u;
+    return rows + row / 2u * (4u + 2u * terms) + term / 4u * 8u + row % 2u * 4u + term % 4u;
 }
 
 /* Sine and cosine of 2 pi halves / (2 N), reduced exactly. */
@@ -62,9 +63,13 @@ static void build_basis(int32_t *rows, const struct frf_block_table *table)
     for (uint32_t row = 0; row < table->layout.terms / 2u; ++row) {
         rotation_of(rows, block, row)[0] = rotation_of(rows, block, row)[1] = 0;
         for (unsigned part = 0; part < 2; ++part) {
+            double peak = 1.0 / basis_scale;
             frf_basis_function(block / 2u, width, part == 0 ? 1 : -1, row, function);
             for (uint32_t i = 0; i < block / 2u; ++i) {
-                *factor_of(rows, block, row, 2u * i + part) = q31(basis_scale * function[i]);
+                peak = fmax(peak, fabs(function[i]));
+            }
+            for (uint32_t i = 0; i < block / 2u; ++i) {
+                *factor_of(rows, block, row, 2u * i + part) = q31(function[i] / peak);
             }
         }
     }
@@ -96,6 +101,16 @@ static double project(int32_t *basis, const struct frf_block_table *table, doubl
     return sqrt(squares / (double)half);
 }
 
+static bool fits_q31(const double *values, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; ++i) {
+        if (!(fabs(values[i]) < 1.0)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* One row; false if the basis does not hold the line. */
 static bool build_row(int32_t *rows, int32_t *basis, const struct frf_block_table *table, uint32_t row)
 {
@@ -108,7 +123,7 @@ static bool build_row(int32_t *rows, int32_t *basis, const struct frf_block_tabl
         const double *values = line;
         sample_line(table, bin, part, line);
         if (basis) {
-            if (!(project(basis, table, line, part, factors) <= basis_error_max)) {
+            if (!(project(basis, table, line, part, factors) <= basis_error_max) || !fits_q31(factors, terms / 2u)) {
                 return false;
             }
             values = factors;
@@ -120,11 +135,11 @@ static bool build_row(int32_t *rows, int32_t *basis, const struct frf_block_tabl
     return true;
 }
 
-/* The last block's centre is (blocks - 1) L + (L - 1)/2 samples after n = 0. */
+/* The last block's centre is (blocks - 1) L + (L - 1)/2 samples after n = 0 of the folded period. */
 static void build_restore(int32_t *restore, const struct frf_block_table *table)
 {
     uint32_t block = table->layout.block_samples, period = table->period_samples;
-    uint64_t halves = 2u * (uint64_t)((period - 1u) / block) * block + block - 1u;
+    uint64_t halves = 2u * (uint64_t)((table->part_samples - 1u) / block) * block + block - 1u;
     for (uint32_t b = 0; b < table->bin_count; ++b) {
         restore[2u * b] = q31(cosine_of_halves(halves * table->bins[b], period));
         restore[2u * b + 1u] = q31(sine_of_halves(halves * table->bins[b], period));
@@ -132,29 +147,112 @@ static void build_restore(int32_t *restore, const struct frf_block_table *table)
 }
 
 /* |sum over any part of a period| <= 2^15 N / sqrt(2), the mean of |cos| over any three or more equal steps of a circle
- * being at most that (four steps). 92000 of the 92681 that fill 31 bits leave room for N rounding errors. Block's own
- * words: a basis function of unit RMS takes at most 2^15 L out of a block. */
-static uint32_t gain_shift_of(uint32_t period, uint32_t block)
+ * being at most that (four steps); it has to stay below 2^30, twice an accumulator being rotated: N 2^shift up to 92681
+ * at half counts, of which 92000 leave room for the rounding errors. A block's own sum, up to 2^15 L Q counts, is kept
+ * 16 times finer in 32 bits; on its way to a basis function of unit RMS it is 2^9 times finer. */
+static bool gain_fits(const struct frf_block_table *table, uint32_t shift)
 {
-    uint32_t shift = 0;
-    while ((period << (shift + 1u)) <= 92000u && (block << (shift + 2u)) <= 65536u && shift < 10u) {
-        ++shift;
-    }
-    return shift;
+    uint64_t gain = (uint64_t)1 << shift, block = (uint64_t)table->layout.block_samples * table->layout.repeats;
+    bool has_basis = table->layout.terms < table->layout.block_samples;
+    return table->period_samples * gain <= 92000u && block * gain <= (has_basis ? 256u : 8192u);
 }
 
-static enum core_status check(const struct frf_block_layout *layout, const uint32_t *bins, uint32_t bin_count,
-                              uint32_t period)
+/* Functions that hold all lines below `width` to basis_error_max within a block: twice the block's length in periods of
+ * the highest line, and more the sharper the edge [found with frf_block_build(), tests/unit/test_frf_block.c]. */
+static uint32_t terms_for(uint32_t block, double width)
 {
-    uint32_t block = layout->block_samples, terms = layout->terms;
-    if (period < 4u || period > SERVOSCOPE_FRF_PERIOD_MAX) {
+    double turns = (double)block * width;
+    uint32_t terms = (uint32_t)ceil((2.0 * turns + 4.0 + 2.2 * log1p(turns)) / 4.0) * 4u;
+    return terms < block ? terms : block;
+}
+
+/* Instructions per sample and bin of the Cortex-M4 kernel: of two rows, 11 a group of four terms and 28 more. */
+static double cost_of(uint32_t block, uint32_t terms, uint32_t bin_count)
+{
+    double bins = (2.75 * (double)terms + 28.0) / (2.0 * (double)block);
+    double basis = terms == block ? 0.0 : (double)terms / 2.0 * (2.75 * (double)block + 28.0) / (2.0 * (double)block);
+    return bins + basis / (double)bin_count;
+}
+
+static uint32_t greatest_divisor(uint32_t a, uint32_t b)
+{
+    while (b != 0) {
+        uint32_t rest = a % b;
+        a = b;
+        b = rest;
+    }
+    return a;
+}
+
+/* Whether all bins leave `rest` when divided by `repeats`. */
+static bool all_leave(const uint32_t *bins, uint32_t bin_count, uint32_t repeats, uint32_t rest)
+{
+    for (uint32_t b = 0; b < bin_count; ++b) {
+        if (bins[b] % repeats != rest) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* The largest Q that the lines allow and that divides the period. */
+static uint32_t repeats_for(const uint32_t *bins, uint32_t bin_count, uint32_t period)
+{
+    uint32_t divisor = period;
+    for (uint32_t b = 0; b < bin_count; ++b) {
+        divisor = greatest_divisor(divisor, bins[b]);
+    }
+    bool odd = period % (2u * divisor) == 0 && all_leave(bins, bin_count, 2u * divisor, divisor);
+    return odd ? 2u * divisor : divisor;
+}
+
+void frf_block_choose(const uint32_t *bins, uint32_t bin_count, uint32_t period_samples, uint32_t part_samples_max,
+                      struct frf_block_layout *out_layout)
+{
+    struct frf_block_layout folded = {32u, 32u, 1u}, exact = {0, 0, 1u};
+    *out_layout = exact;
+    if (!SERVOSCOPE_FRF_LONG_MULTIPLY || frf_check_bins(bins, bin_count, period_samples) != core_ok) {
+        return;
+    }
+    /* Of the bounds on L Q the basis's is the narrow one: four parts leave L = 64. */
+    uint32_t repeats = repeats_for(bins, bin_count, period_samples);
+    if (period_samples / repeats > part_samples_max || period_samples / repeats < 64u || repeats > 256u) {
+        repeats = 1u;
+    }
+    uint32_t part = period_samples / repeats;
+    if (part < 64u) {
+        return;
+    }
+    folded.repeats = repeats;
+    *out_layout = folded;
+    double width = (double)bins[bin_count - 1u] / (double)period_samples, least = cost_of(32u, 32u, bin_count);
+    for (uint32_t block = 32u; block <= FRF_BLOCK_SAMPLES_MAX && 2u * block <= part && block * repeats <= 256u;
+         block *= 2u) {
+        struct frf_block_layout layout = {block, terms_for(block, width), repeats};
+        double cost = cost_of(block, layout.terms, bin_count);
+        if (layout.terms < block && cost < least) {
+            least = cost;
+            *out_layout = layout;
+        }
+    }
+}
+
+static enum core_status check(const struct frf_block_table *table)
+{
+    uint32_t block = table->layout.block_samples, terms = table->layout.terms, repeats = table->layout.repeats;
+    if (table->period_samples < 4u || table->period_samples > SERVOSCOPE_FRF_PERIOD_MAX) {
         return core_err_frf_period;
     }
-    if (block < 8u || block > FRF_BLOCK_SAMPLES_MAX || block % 4u != 0u || block > period || terms < 4u ||
-        terms > block || terms % 4u != 0u) {
+    if (block < 8u || block > FRF_BLOCK_SAMPLES_MAX || block % 4u != 0u || terms < 4u || terms > block ||
+        terms % 4u != 0u || table->period_samples % repeats != 0u || block > table->part_samples ||
+        !gain_fits(table, 0)) {
         return core_err_frf_block;
     }
-    return frf_check_bins(bins, bin_count, period);
+    enum core_status status = frf_check_bins(table->bins, table->bin_count, table->period_samples);
+    if (status == core_ok && !all_leave(table->bins, table->bin_count, repeats, table->alternate ? repeats / 2u : 0u)) {
+        return core_err_frf_block;
+    }
+    return status;
 }
 
 enum core_status frf_block_build(int32_t *storage, uint32_t words, const uint32_t *bins, uint32_t bin_count,
@@ -164,7 +262,11 @@ enum core_status frf_block_build(int32_t *storage, uint32_t words, const uint32_
     if (!storage || !bins || !layout || !out_table) {
         return core_err_argument;
     }
-    enum core_status status = check(layout, bins, bin_count, period_samples);
+    struct frf_block_table table = {storage, NULL, NULL, bins, bin_count, period_samples, 0, false, *layout, 0};
+    table.layout.repeats = layout->repeats > 1u ? layout->repeats : 1u;
+    table.part_samples = period_samples / table.layout.repeats;
+    table.alternate = bin_count > 0 && bins[0] % table.layout.repeats != 0u && table.layout.repeats % 2u == 0u;
+    enum core_status status = check(&table);
     if (status != core_ok) {
         return status;
     }
@@ -173,8 +275,11 @@ enum core_status frf_block_build(int32_t *storage, uint32_t words, const uint32_
         return core_err_storage;
     }
     int32_t *restore = storage + rows * (2u + terms), *basis = terms == block ? NULL : restore + 2u * bin_count;
-    struct frf_block_table table = {storage, restore, basis, bins, bin_count, period_samples, *layout, 0};
-    table.gain_shift = gain_shift_of(period_samples, block);
+    table.restore = restore;
+    table.basis = basis;
+    while (gain_fits(&table, table.gain_shift + 1u)) {
+        ++table.gain_shift;
+    }
     if (basis) {
         build_basis(basis, &table);
     }

@@ -55,6 +55,12 @@ static double burst(size_t n)
     return on ? 0.03 * sin(two_pi * 0.15 * (double)n) : 0.0;
 }
 
+/// A bias that jumps in the middle of the fifth period.
+static double jump(size_t n)
+{
+    return n >= lead + 4 * samples + samples / 2 ? 0.001 : 0.0;
+}
+
 void setUp(void)
 {
     sim_model_default(&model);
@@ -228,6 +234,32 @@ static void test_structure_finds_a_burst_and_says_when(void)
     TEST_ASSERT_TRUE_MESSAGE(at_s - 0.032 < real_s && to_s + 0.032 > real_s, found.where); // or the stretch beside it
 }
 
+static void test_structure_finds_a_bias_that_jumps_and_says_when(void)
+{
+    record(jump, 18);
+    struct structure found = look();
+    TEST_ASSERT_TRUE_MESSAGE(found.found, message);
+    const char *when = strstr(found.where, "from about");
+    TEST_ASSERT_NOT_NULL_MESSAGE(when, found.where);
+    double real_s = (double)(lead + 4 * samples + samples / 2) / rate_hz, period_s = samples / rate_hz;
+    TEST_ASSERT_DOUBLE_WITHIN(period_s, real_s, strtod(when + strlen("from about"), NULL));
+    TEST_ASSERT_TRUE(structure_holds(&found, 0) && !structure_holds(&found, band));
+}
+
+static void test_structure_merges_places_and_keeps_the_stronger_words(void)
+{
+    struct structure weak = {.found = true, .nats = 20.0, .place_count = 1, .place_first = {3}, .place_last = {5}};
+    struct structure strong = {.found = true, .nats = 90.0, .place_count = 1, .place_first = {40}, .place_last = {40}};
+    struct structure none = {0}, sum = weak;
+    structure_merge(&sum, &strong);
+    TEST_ASSERT_EQUAL_DOUBLE(strong.nats, sum.nats);
+    TEST_ASSERT_TRUE(structure_holds(&sum, 4) && structure_holds(&sum, 40) && !structure_holds(&sum, 6));
+    structure_merge(&sum, &none);
+    structure_merge(&none, &sum);
+    TEST_ASSERT_EQUAL_UINT(2, sum.place_count);
+    TEST_ASSERT_EQUAL_MEMORY(&sum, &none, sizeof sum);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -239,5 +271,7 @@ int main(void)
     RUN_TEST(test_structure_is_not_found_in_noise);
     RUN_TEST(test_structure_finds_a_slow_change_in_its_octave);
     RUN_TEST(test_structure_finds_a_burst_and_says_when);
+    RUN_TEST(test_structure_finds_a_bias_that_jumps_and_says_when);
+    RUN_TEST(test_structure_merges_places_and_keeps_the_stronger_words);
     return UNITY_END();
 }

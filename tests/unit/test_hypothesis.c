@@ -148,6 +148,7 @@ static void test_hypothesis_naming_starts_at_the_values_and_opens_the_box(void)
             setUp();
             given.linear = linear;
             hypothesis_init(&hypothesis, &given, false, true);
+            hypothesis.sensors_seen = true;
             // What is noticed in the rows is no hypothesis, and a belt's effects take two masses.
             bool expected = !effect->notice && (!effect->applies || effect->applies(&given));
             TEST_ASSERT_EQUAL_INT_MESSAGE(expected, hypothesis_may_name(&hypothesis, e), effect->id);
@@ -329,6 +330,7 @@ static void assert_deviations(int effect, const double *values, double size)
     // Five standard deviations of a deviation estimated from that many draws, 5 / sqrt(2 draws), and the curvature of
     // size^2.
     const double chance = 0.025;
+    hypothesis.sensors_seen = true;
     hypothesis_name(&hypothesis, effect, values);
     size_t n = hypothesis.count;
     for (size_t i = 0; i < n; i++) // a search moves on from where it started
@@ -386,6 +388,34 @@ static void test_hypothesis_deviations_of_amplitude_and_phase_hold_at_any_phase(
     }
 }
 
+static void test_hypothesis_takes_what_only_two_motion_columns_show_as_usual_without_them(void)
+{
+    for (int e = 0; sim_effects[e]; e++)
+        for (size_t i = 0; sim_effects[e]->sense && i < sim_effects[e]->parameter_count; i++) {
+            double values[sim_effect_parameters_max] = {0}, got[sim_effect_parameters_max] = {0};
+            const struct sim_parameter *p = &sim_effects[e]->parameters[i];
+            if (!p->optional)
+                continue;
+            hypothesis_init(&hypothesis, &given, false, true);
+            scan_values(e, values);
+            values[i] = 0.5 * (p->minimum + p->maximum);
+            hypothesis_name(&hypothesis, e, values);
+            hypothesis_parameters(&hypothesis, e, NULL, got, NULL);
+            TEST_ASSERT_EQUAL_DOUBLE(p->usual, got[i]);
+            struct sim_model model;
+            hypothesis_model(&hypothesis, NULL, &model);
+            TEST_ASSERT_EQUAL_DOUBLE(p->usual, model.effect_parameters[e][i]);
+        }
+}
+
+static void test_hypothesis_leaves_the_inertia_of_a_rigid_body_to_a_free_gain(void)
+{
+    int inertia = effect_of("inertia");
+    TEST_ASSERT_TRUE(hypothesis_may_name(&hypothesis, inertia));
+    hypothesis.gain_free = true;
+    TEST_ASSERT_FALSE(hypothesis_may_name(&hypothesis, inertia));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -401,5 +431,7 @@ int main(void)
     RUN_TEST(test_hypothesis_does_not_name_what_the_given_model_has_on);
     RUN_TEST(test_hypothesis_deviations_are_the_scatter_of_the_parameters);
     RUN_TEST(test_hypothesis_deviations_of_amplitude_and_phase_hold_at_any_phase);
+    RUN_TEST(test_hypothesis_takes_what_only_two_motion_columns_show_as_usual_without_them);
+    RUN_TEST(test_hypothesis_leaves_the_inertia_of_a_rigid_body_to_a_free_gain);
     return UNITY_END();
 }

@@ -38,7 +38,11 @@ void setUp(void)
     text[0] = 0;
 }
 
-void tearDown(void) {}
+void tearDown(void)
+{
+    free(out.kinematics);
+    out.kinematics = NULL;
+}
 
 static void add_noise(double position_rad, double velocity_rad_per_s)
 {
@@ -185,6 +189,47 @@ static void test_motion_keeps_a_speed_column_within_the_tolerances(void)
     TEST_ASSERT_NULL_MESSAGE(strstr(text, "left out"), text);
 }
 
+/// The position column's sensor runs out of true: wrong by position, which passes over several turns here.
+static void spoil_position(double amplitude)
+{
+    for (size_t i = 0; i < rows; i++)
+        position[i] += amplitude * cos(20.0 * true_position[i]);
+}
+
+static void test_motion_takes_the_speed_column_alone_where_a_position_is_wrong_by_position(void)
+{
+    add_noise(1e-6, 1e-3);
+    spoil_position(5e-4);
+    estimate(position, velocity, period);
+    TEST_ASSERT_EQUAL_MEMORY(velocity, out_velocity, sizeof velocity);
+    TEST_ASSERT_NOT_NULL(out.kinematics);
+    // What the columns differ by is the sensor's error, less the noise of both: 1e-3 and sqrt(1.6) * 1e-6 * 1000 Hz.
+    double sum = 0.0;
+    for (size_t i = period; i < 3 * period; i++) {
+        double expected = 5e-4 * 20.0 * sin(20.0 * true_position[i]) * true_velocity[i];
+        sum += (out.kinematics[i] - expected) * (out.kinematics[i] - expected) / (2.0 * period);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(2e-3, 0.0, sqrt(sum));
+}
+
+static void test_motion_keeps_a_speed_column_whose_gain_errs_both_ways_over_the_travel(void)
+{
+    // A tenth of the speed at the ends of the travel, which is far more than a column in a wrong unit is let pass.
+    for (size_t i = 0; i < rows; i++)
+        velocity[i] *= 1.0 + 0.1 * sin(6.0 * true_position[i] + 1.0);
+    estimate(position, velocity, period);
+    TEST_ASSERT_NULL(strstr(text, "left out"));
+    TEST_ASSERT_NOT_NULL(out.kinematics);
+}
+
+static void test_motion_of_one_column_has_no_kinematics(void)
+{
+    estimate(position, NULL, period);
+    TEST_ASSERT_NULL(out.kinematics);
+    estimate(NULL, velocity, period);
+    TEST_ASSERT_NULL(out.kinematics);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -197,5 +242,8 @@ int main(void)
     RUN_TEST(test_motion_leaves_out_a_speed_column_of_another_gain_and_says_so);
     RUN_TEST(test_motion_leaves_out_a_late_speed_column_and_says_how_late);
     RUN_TEST(test_motion_keeps_a_speed_column_within_the_tolerances);
+    RUN_TEST(test_motion_takes_the_speed_column_alone_where_a_position_is_wrong_by_position);
+    RUN_TEST(test_motion_keeps_a_speed_column_whose_gain_errs_both_ways_over_the_travel);
+    RUN_TEST(test_motion_of_one_column_has_no_kinematics);
     return UNITY_END();
 }

@@ -81,6 +81,22 @@ static void test_oscillation_is_not_a_drift(void)
     TEST_ASSERT_FALSE(oscillation.found);
 }
 
+/// A transient of 3 s in 4 s, and the ringing of a resonance: both die away.
+static void test_oscillation_is_not_a_transient(void)
+{
+    for (int ringing = 0; ringing <= 1; ringing++) {
+        make(0.0, 0.0, 0.02, 0.0);
+        double *position = run.columns[1].data;
+        for (size_t n = 0; n < run.rows; n++) {
+            const double t = 1e-3 * (double)n;
+            position[n] += ringing ? 5.0 * exp(-t / 1.0) * sin(two_pi * 37.3 * t) : 20.0 * exp(-t / 3.0);
+        }
+        TEST_ASSERT_TRUE(oscillation_measure(&recording, &oscillation));
+        TEST_ASSERT_FALSE(oscillation.found);
+        tearDown();
+    }
+}
+
 static void test_oscillation_too_small_to_matter_is_not_told(void)
 {
     make(0.01, 37.3, 0.001, 0.0);
@@ -94,6 +110,7 @@ int main(void)
     RUN_TEST(test_oscillation_is_seen_under_noise_of_its_size);
     RUN_TEST(test_oscillation_is_not_seen_in_noise);
     RUN_TEST(test_oscillation_is_not_a_drift);
+    RUN_TEST(test_oscillation_is_not_a_transient);
     RUN_TEST(test_oscillation_too_small_to_matter_is_not_told);
     return UNITY_END();
 }

@@ -90,6 +90,28 @@ static void test_settle_stops_at_half_of_a_recording_that_never_settles(void)
     TEST_ASSERT_TRUE(settle.periods <= periods / 2);
 }
 
+/// Whatever stands in a period with lost samples, it is neither a transient nor a level.
+static void test_settle_looks_at_no_period_with_lost_samples(void)
+{
+    enum { periods = 8, bins = 50 };
+    static double complex spectra[periods * bins];
+    bool usable[periods] = {false, true, true, true, true, true, true, false};
+    double level[periods];
+    struct settle settle;
+    make_periods(spectra, periods, bins, 0.0, 1.0, 4);
+    for (size_t b = 0; b < bins; b++) {
+        spectra[b] = 1e9;
+        spectra[(periods - 1) * bins + b] = -1e9;
+    }
+    TEST_ASSERT_TRUE(settle_measure(spectra, periods, bins, usable, &settle, level));
+    TEST_ASSERT_EQUAL_size_t(0, settle.periods);
+    TEST_ASSERT_TRUE(settle.settled);
+    TEST_ASSERT_TRUE(isnan(level[0]) && isnan(level[periods - 1]));
+    for (size_t p = 1; p + 1 < periods; p++) {
+        TEST_ASSERT_TRUE(level[p] < 1.0);
+    }
+}
+
 static void test_settle_says_when_it_cannot_tell(void)
 {
     enum { periods = 3, bins = 4 };
@@ -109,6 +131,7 @@ int main(void)
     RUN_TEST(test_settle_counts_periods_of_a_decaying_transient);
     RUN_TEST(test_settle_leaves_nothing_out_without_a_transient);
     RUN_TEST(test_settle_stops_at_half_of_a_recording_that_never_settles);
+    RUN_TEST(test_settle_looks_at_no_period_with_lost_samples);
     RUN_TEST(test_settle_says_when_it_cannot_tell);
     return UNITY_END();
 }

@@ -346,9 +346,65 @@ static void test_tune_nyquist_takes_a_position_response(void)
     TEST_ASSERT_NOT_NULL(strstr(nyquist.reason, "nothing holds the position"));
 }
 
+/// Lines 1/delay apart show a curve without the delay, which would be stable.
+static void test_tune_nyquist_refuses_a_known_delay_that_lines_do_not_show(void)
+{
+    static const struct {
+        double step_hz, loop_delay_s, removed_s;
+        enum nyquist_verdict verdict;
+    } cases[] = {
+        {1.0, 0.0, 0.0, nyquist_stable},    {1.0, 0.001, 0.0, nyquist_stable},   {1.0, 0.05, 0.0, nyquist_unstable},
+        {1.0, 1.0, 0.0, nyquist_undecided}, {1.0, 0.0, 1.0, nyquist_undecided},  {1.0, 0.5, 0.5, nyquist_undecided},
+        {1.0, 3.0, 0.0, nyquist_undecided}, {1.0, 0.9, 0.0, nyquist_undecided},  {2.0, 0.5, 0.0, nyquist_undecided},
+        {5.0, 0.2, 0.0, nyquist_undecided}, {0.125, 0.05, 0.0, nyquist_unstable},
+    };
+    const double crossover = known_two_pi * 30.0, inertia = 0.005;
+    const struct known_drive drive = known_rigid(2000.0, 1, inertia, 0.01);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct error error;
+        char removed[32], which[600];
+        const double step_hz = cases[i].step_hz;
+        frf = known_frf(&drive, step_hz, step_hz, (size_t)(990.0 / step_hz));
+        snprintf(removed, sizeof removed, "%.6g", cases[i].removed_s);
+        TEST_ASSERT_TRUE(frf_set_text(&frf.keys[0].key, "delay_removed_s") &&
+                         frf_set_text(&frf.keys[0].value, removed));
+        TEST_ASSERT_EQUAL_INT(0,
+                              tune_plant_take("frf.csv", &frf, drive.rate_hz, cases[i].loop_delay_s, &plant, &error));
+        loop = calloc(plant.count, sizeof *loop);
+        const struct nyquist nyquist = judge(crossover * inertia, 0.1);
+        snprintf(which, sizeof which, "lines %g Hz apart, loop delay %g s, removed %g s: %s", step_hz,
+                 cases[i].loop_delay_s, cases[i].removed_s, nyquist.reason);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(cases[i].verdict, nyquist.verdict, which);
+        if (nyquist.verdict == nyquist_undecided)
+            TEST_ASSERT_TRUE_MESSAGE(strstr(nyquist.reason, "known delay") != NULL, which);
+        tearDown();
+    }
+}
+
+/// A delay that the response itself contains, of half a turn or more from line to line: no lead is taken for a drive's.
+static void test_tune_nyquist_refuses_a_delay_that_lines_show_backwards(void)
+{
+    static const double turns[] = {0.26, 0.4, 0.5, 0.6, 0.75, 0.85, 0.95};
+    const double inertia = 0.005;
+    for (size_t i = 0; i < sizeof turns / sizeof *turns; i++) {
+        char which[600];
+        const struct known_drive drive = known_rigid(2000.0, 1, inertia, 0.01);
+        take(&drive, 1.0, 1.0, 990);
+        for (size_t k = 0; k < plant.count; k++) // the lowest line's branch is told by a lower one in practice
+            plant.response[k] *= cexp(-I * known_two_pi * turns[i] * (plant.frequency_hz[k] - 1.0));
+        const struct nyquist nyquist = judge(known_two_pi * 30.0 * inertia, 0.1);
+        snprintf(which, sizeof which, "%g turns per line: %s", turns[i], nyquist.reason);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(nyquist_undecided, nyquist.verdict, which);
+        TEST_ASSERT_TRUE_MESSAGE(strstr(which, "delay") != NULL, which);
+        tearDown();
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_tune_nyquist_refuses_a_known_delay_that_lines_do_not_show);
+    RUN_TEST(test_tune_nyquist_refuses_a_delay_that_lines_show_backwards);
     RUN_TEST(test_tune_nyquist_agrees_with_the_poles_of_random_loops);
     RUN_TEST(test_tune_nyquist_counts_unstable_poles);
     RUN_TEST(test_tune_nyquist_refuses_lines_that_begin_above_the_crossover);

@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { outputs_max = 3, sentences_max = 8 };
+enum { outputs_max = 3, sentences_max = 12 };
 
 struct arguments {
     struct option_values runs;

@@ -221,13 +221,15 @@ static bool summarise(const struct periodic *recording, struct estimating_summar
         .settle = recording->settle,
         .lost = recording->lost,
         .first_lost_row = recording->first_lost_row,
+        .lost_outside = recording->lost_outside,
+        .first_lost_outside = recording->first_lost_outside,
         .used = recording->used,
         .period_found = recording->period_found,
         .bins_found = recording->bins_found,
         .doubtful = recording->doubtful_count,
         .transient = recording->transient,
-        .first_level = recording->output_level[0],
-        .last_level = recording->output_level[recording->total - 1],
+        .first_level = periodic_first_level(recording),
+        .last_level = periodic_last_level(recording),
     };
     estimate_advise(recording, &out_summary->advice);
     out_summary->levels = malloc(recording->total * sizeof *out_summary->levels);

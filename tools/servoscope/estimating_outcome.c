@@ -90,6 +90,12 @@ static void say_periods(const struct estimating_summary *run, struct remarks *io
                     "distortion; --lines would say",
                     run->doubtful);
     }
+    if (run->lost_outside > 0) {
+        remarks_add(io_remarks, remark_fact, "lost_outside",
+                    "%zu lost samples (the first in row %zu) cost no period that would count: they lie in what is left "
+                    "out for settling or behind the last whole period",
+                    run->lost_outside, run->first_lost_outside);
+    }
     say_settling(run, io_remarks);
     if (run->leading_periods > 0) {
         remarks_add(io_remarks, remark_fact, "pieces",
@@ -218,6 +224,7 @@ static cJSON *json_of_run(const char *path, const struct estimating_summary *run
     }
     cJSON_AddNumberToObject(object, "settle_periods", (double)run->settle);
     cJSON_AddNumberToObject(object, "lost_periods", (double)run->lost);
+    cJSON_AddNumberToObject(object, "lost_rows_outside", (double)run->lost_outside);
     cJSON_AddNumberToObject(object, "periods", (double)run->used);
     cJSON_AddBoolToObject(object, "settled", run->transient.settled);
     cJSON_AddNumberToObject(object, "transient_first_period", run->first_level);

@@ -30,6 +30,8 @@ struct estimating_summary {
     size_t settle;
     size_t lost;
     size_t first_lost_row;
+    size_t lost_outside; ///< lost rows in what is left out anyway
+    size_t first_lost_outside;
     size_t used;
     bool period_found;
     bool bins_found;

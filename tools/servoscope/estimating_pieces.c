@@ -202,7 +202,7 @@ static int estimate_part(const struct run *part, const struct periodic_options *
     io_summary->total += recording->total;
     io_summary->lost += recording->lost;
     io_summary->used += recording->used;
-    io_summary->last_level = recording->output_level[recording->total - 1];
+    io_summary->last_level = periodic_last_level(recording);
     status = frf_mean_estimate(recording, NULL, out_frf, out_error);
     if (is_first) {
         io_summary->period_samples = recording->period_samples;
@@ -211,7 +211,7 @@ static int estimate_part(const struct run *part, const struct periodic_options *
         io_summary->doubtful = recording->doubtful_count;
         io_summary->settle = recording->settle;
         io_summary->transient = recording->transient;
-        io_summary->first_level = recording->output_level[0];
+        io_summary->first_level = periodic_first_level(recording);
         io_summary->first_lost_row = recording->first_lost_row;
         io_first->period_samples = recording->period_samples;
         io_first->bin_count = recording->bin_count;

@@ -1,0 +1,200 @@
+/* SPDX-License-Identifier: MIT */
+/* What the DFT at the excited bins costs on a Cortex-M, counted; the same program on the host gives the same sums.
+ * Prints a line a case: name, channels, instructions (a period fed at once, a period fed frame by frame, the longest
+ * call of one frame, the same with the work spread), samples times bins times channels, RAM and table bytes, and a
+ * checksum of all sums. */
+#include "bench/firmware_port.h"
+
+#include "frf/block.h"
+
+#define PERIOD_MAX   16384u
+#define BINS_MAX     200u
+#define CHANNELS_MAX 2u
+
+static int32_t coefficients[FRF_BLOCK_TABLE_WORDS(BINS_MAX, 128u, 128u)];
+static int32_t storage[FRF_BLOCK_STORAGE_WORDS(BINS_MAX, CHANNELS_MAX, 1u, 128u, 64u)];
+static int16_t frames[FRF_BLOCK_FRAME_SAMPLES(CHANNELS_MAX, 128u)];
+static union frf_word words[FRF_STORAGE_WORDS(BINS_MAX, CHANNELS_MAX)];
+static int32_t table[FRF_TWIDDLE_WORDS(PERIOD_MAX)];
+static int16_t samples[PERIOD_MAX * CHANNELS_MAX];
+static uint32_t bins[BINS_MAX];
+
+struct cost {
+    uint32_t at_once, by_frames, longest, longest_spread;
+};
+
+static void fill(uint32_t count)
+{
+    uint32_t state = 1;
+    for (uint32_t i = 0; i < count; ++i) {
+        state = state * 1664525u + 1013904223u;
+        samples[i] = (int16_t)((int32_t)(state >> 17) - 16384);
+    }
+}
+
+static void spread_bins(uint32_t last, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; ++i) {
+        bins[i] = 1u + i * (last - 1u) / (count - 1u);
+    }
+}
+
+/* Fletcher's way: the order counts. */
+static void add_to(uint32_t *io_checksum, int64_t value)
+{
+    uint64_t bits = (uint64_t)value;
+    io_checksum[0] += (uint32_t)bits;
+    io_checksum[1] += io_checksum[0];
+    io_checksum[0] += (uint32_t)(bits >> 32);
+    io_checksum[1] += io_checksum[0];
+}
+
+static void print_case(const char *name, uint32_t channels, const struct cost *cost, uint32_t products, uint32_t ram,
+                       uint32_t table_bytes, const uint32_t *checksum)
+{
+    const uint32_t values[] = {channels, cost->at_once, cost->by_frames, cost->longest, cost->longest_spread,
+                               products, ram,           table_bytes,     checksum[0],   checksum[1]};
+    port_print(name);
+    for (unsigned i = 0; i < sizeof values / sizeof values[0]; ++i) {
+        port_print(" ");
+        port_print_number(values[i]);
+    }
+    port_print("\n");
+}
+
+static void count_block_by_frames(struct frf_block *dft, uint32_t *out_all, uint32_t *out_longest)
+{
+    uint32_t begin = port_instructions();
+    for (uint32_t n = 0; n < dft->table.period_samples; ++n) {
+        frf_block_add_i16(dft, samples + n * dft->channels, 1);
+    }
+    *out_all = port_instructions() - begin;
+    *out_longest = 0;
+    for (uint32_t n = 0; n < dft->table.period_samples; ++n) {
+        begin = port_instructions();
+        frf_block_add_i16(dft, samples + n * dft->channels, 1);
+        uint32_t count = port_instructions() - begin;
+        *out_longest = count > *out_longest ? count : *out_longest;
+    }
+}
+
+static void run_block(const char *name, uint32_t period, uint32_t last, uint32_t bin_count, uint32_t channels,
+                      uint32_t block, uint32_t terms)
+{
+    struct frf_block_layout layout = {block, terms, 1};
+    struct frf_block_table block_table;
+    struct frf_block_config config = {&block_table,
+                                      channels,
+                                      1,
+                                      false,
+                                      storage,
+                                      sizeof storage / sizeof *storage,
+                                      frames,
+                                      sizeof frames / sizeof *frames,
+                                      0,
+                                      0};
+    struct frf_block dft;
+    struct frf_block_period latched;
+    struct cost cost;
+    uint32_t checksum[2] = {1, 0}, unused;
+    spread_bins(last, bin_count);
+    fill(period * channels);
+    if (frf_block_build(coefficients, sizeof coefficients / sizeof *coefficients, bins, bin_count, period, &layout,
+                        &block_table) != core_ok ||
+        frf_block_init(&dft, &config) != core_ok) {
+        port_exit(1);
+    }
+    uint32_t begin = port_instructions();
+    frf_block_add_i16(&dft, samples, period);
+    cost.at_once = port_instructions() - begin;
+    if (!frf_block_latest(&dft, &latched)) {
+        port_exit(1);
+    }
+    for (uint32_t b = 0; b < bin_count * channels; ++b) {
+        int64_t real, imaginary;
+        frf_block_sums(&dft, &latched, b % bin_count, b / bin_count, &real, &imaginary);
+        add_to(checksum, real);
+        add_to(checksum, imaginary);
+    }
+    count_block_by_frames(&dft, &cost.by_frames, &cost.longest);
+    config.spread = true;
+    if (frf_block_init(&dft, &config) != core_ok) {
+        port_exit(1);
+    }
+    count_block_by_frames(&dft, &unused, &cost.longest_spread);
+    print_case(name, channels, &cost, period * bin_count * channels,
+               4u * FRF_BLOCK_STORAGE_WORDS(bin_count, channels, 1u, block, terms) +
+                   2u * FRF_BLOCK_FRAME_SAMPLES(channels, block),
+               4u * FRF_BLOCK_TABLE_WORDS(bin_count, block, terms), checksum);
+}
+
+static enum core_status init_exact(struct frf_dft *dft, const struct frf_dft_config *config, uint32_t period,
+                                   bool is_q31)
+{
+    struct frf_twiddles_q15 q15;
+    struct frf_twiddles_q31 q31;
+    enum core_status status;
+    if (is_q31) {
+        status = frf_twiddles_build_q31(table, FRF_TWIDDLE_WORDS(period), period, &q31);
+        return status == core_ok ? frf_dft_init_q31(dft, config, &q31) : status;
+    }
+    status = frf_twiddles_build_q15((int16_t *)(void *)table, FRF_TWIDDLE_WORDS(period), period, &q15);
+    return status == core_ok ? frf_dft_init_q15(dft, config, &q15) : status;
+}
+
+static void run_exact(const char *name, uint32_t period, uint32_t last, uint32_t bin_count, bool is_q31)
+{
+    struct frf_dft_config config = {bins, bin_count, 1, words, sizeof words / sizeof *words, 0, 0};
+    struct frf_dft dft;
+    struct frf_period latched;
+    struct cost cost = {0, 0, 0, 0};
+    uint32_t checksum[2] = {1, 0};
+    spread_bins(last, bin_count);
+    fill(period);
+    if (init_exact(&dft, &config, period, is_q31) != core_ok) {
+        port_exit(1);
+    }
+    uint32_t begin = port_instructions();
+    frf_dft_add_i16(&dft, samples, period);
+    cost.at_once = port_instructions() - begin;
+    if (!frf_dft_latest(&dft, &latched)) {
+        port_exit(1);
+    }
+    for (uint32_t b = 0; b < bin_count; ++b) {
+        add_to(checksum, frf_period_real(&dft, &latched, b, 0));
+        add_to(checksum, frf_period_imaginary(&dft, &latched, b, 0));
+    }
+    begin = port_instructions();
+    for (uint32_t n = 0; n < period; ++n) {
+        uint32_t before = port_instructions();
+        frf_dft_add_i16(&dft, samples + n, 1);
+        uint32_t count = port_instructions() - before;
+        cost.longest = count > cost.longest ? count : cost.longest;
+    }
+    cost.by_frames = port_instructions() - begin;
+    cost.longest_spread = cost.longest;
+    print_case(name, 1, &cost, period * bin_count, 8u * FRF_STORAGE_WORDS(bin_count, 1u),
+               (is_q31 ? 4u : 2u) * FRF_TWIDDLE_WORDS(period), checksum);
+}
+
+int main(void)
+{
+    run_exact("exact-q15", 2000, 900, BINS_MAX, false);
+    run_exact("exact-q31", 2000, 900, BINS_MAX, true);
+    static const uint32_t counts[] = {32, BINS_MAX};
+    for (unsigned c = 0; c < 2; ++c) {
+        uint32_t count = counts[c];
+        bool few = count == 32;
+        for (uint32_t channels = 1; channels <= CHANNELS_MAX; ++channels) {
+            run_block(few ? "any-16-K32" : "any-16-K200", 2000, 900, count, channels, 16, 16);
+            run_block(few ? "any-32-K32" : "any-32-K200", 2000, 900, count, channels, 32, 32);
+            run_block(few ? "any-64-K32" : "any-64-K200", 2000, 900, count, channels, 64, 64);
+            run_block(few ? "any-128-K32" : "any-128-K200", 2000, 900, count, channels, 128, 128);
+            run_block(few ? "below-0.1-64-K32" : "below-0.1-64-K200", 2000, 200, count, channels, 64, 24);
+            run_block(few ? "below-0.1-128-K32" : "below-0.1-128-K200", 2000, 200, count, channels, 128, 36);
+            run_block(few ? "below-0.02-64-K32" : "below-0.02-64-K200", 16384, 327, count, channels, 64, 12);
+            run_block(few ? "below-0.02-128-K32" : "below-0.02-128-K200", 16384, 327, count, channels, 128, 12);
+        }
+    }
+    port_exit(0);
+}

@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: MIT */
+#include "frf/dft.h"
+
+#define FRF_TWIDDLES struct frf_twiddles_q31
+#define FRF_MEMBER   q31
+#define FRF_FACTOR   int64_t
+#include "frf/dft_integer.h"
+
+/* |sum| <= 2^15 * (2^31 - 1) * N: has to stay below 2^63. */
+CORE_STATIC_ASSERT((uint64_t)SERVOSCOPE_FRF_PERIOD_MAX <= ((uint64_t)1 << 62) >> (15 + 31),
+                   accumulator_cannot_overflow);
+
+enum core_status frf_dft_init_q31(struct frf_dft *self, const struct frf_dft_config *config,
+                                  const struct frf_twiddles_q31 *twiddles)
+{
+    if (!twiddles || !twiddles->sine || !twiddles->cosine) {
+        return core_err_argument;
+    }
+    enum core_status status = frf_dft_set_up(self, config, twiddles->period_samples, frf_number_q31, add);
+    if (status == core_ok) {
+        self->twiddles.q31 = *twiddles;
+    }
+    return status;
+}
