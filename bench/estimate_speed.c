@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /// Times method mean and method lpm on recordings that it writes for numpy too (bench/estimate.sh).
 /// usage: estimate_speed FOLDER
-/// For every case METHOD-N-PERIODS a file .f64 with input then output, periods x N doubles each (unless it is there from
-/// the run before), and one -result.f64 with real, imaginary part and standard deviation, lines each; on standard output
-/// one line of JSON per case.
+/// For every case METHOD-N-PERIODS a file .f64 with input then output, periods x N doubles each (unless it is there
+/// from the run before), and one -result.f64 with real, imaginary part and standard deviation, lines each; on standard
+/// output one line of JSON per case.
 #include "lab/estimate/frf_lpm.h"
 #include "lab/estimate/frf_mean.h"
 #include "lab/numeric/fft.h"
@@ -150,7 +150,7 @@ static void measure(const char *folder, const char *method, estimator *estimate,
 
 int main(int argc, char **argv)
 {
-    /* Multiples of four with small prime factors; a prime, one with many factors, an odd one and one twice an odd one. */
+    /* Multiples of four with small prime factors; a prime, one with many factors, an odd one, one twice an odd one. */
     static const size_t lengths[] = {2000, 10000, 16384, 65536, 10007, 10010, 3125, 1250};
     enum { sizes = sizeof lengths / sizeof lengths[0], with_lpm = 4 };
     static const size_t few_periods[] = {3, 6, 20};

@@ -13,6 +13,7 @@
 
 static int32_t coefficients[FRF_BLOCK_TABLE_WORDS(BINS_MAX, 128u, 128u)];
 static int32_t storage[FRF_BLOCK_STORAGE_WORDS(BINS_MAX, CHANNELS_MAX, 1u, 128u, 64u)];
+static int32_t part[FRF_BLOCK_PART_WORDS(CHANNELS_MAX, 2000u, 2u, 128u)];
 static int16_t frames[FRF_BLOCK_FRAME_SAMPLES(CHANNELS_MAX, 128u)];
 static union frf_word words[FRF_STORAGE_WORDS(BINS_MAX, CHANNELS_MAX)];
 static int32_t table[FRF_TWIDDLE_WORDS(PERIOD_MAX)];
@@ -36,6 +37,13 @@ static void spread_bins(uint32_t last, uint32_t count)
 {
     for (uint32_t i = 0; i < count; ++i) {
         bins[i] = 1u + i * (last - 1u) / (count - 1u);
+    }
+}
+
+static void odd_bins(uint32_t count)
+{
+    for (uint32_t i = 0; i < count; ++i) {
+        bins[i] = 2u * i + 1u;
     }
 }
 
@@ -78,26 +86,23 @@ static void count_block_by_frames(struct frf_block *dft, uint32_t *out_all, uint
     }
 }
 
-static void run_block(const char *name, uint32_t period, uint32_t last, uint32_t bin_count, uint32_t channels,
-                      uint32_t block, uint32_t terms)
+/* repeats: 1, or 2 for odd lines */
+static void run_block(const char *name, uint32_t period, uint32_t bin_count, uint32_t channels, uint32_t block,
+                      uint32_t terms, uint32_t repeats)
 {
-    struct frf_block_layout layout = {block, terms, 1};
+    struct frf_block_layout layout = {block, terms, repeats};
     struct frf_block_table block_table;
-    struct frf_block_config config = {&block_table,
-                                      channels,
-                                      1,
-                                      false,
-                                      storage,
-                                      sizeof storage / sizeof *storage,
-                                      frames,
-                                      sizeof frames / sizeof *frames,
-                                      0,
-                                      0};
+    struct frf_block_config config = {.table = &block_table, .channels = channels, .banks = 1};
     struct frf_block dft;
     struct frf_block_period latched;
     struct cost cost;
     uint32_t checksum[2] = {1, 0}, unused;
-    spread_bins(last, bin_count);
+    config.storage = storage;
+    config.storage_words = sizeof storage / sizeof *storage;
+    config.frames = frames;
+    config.frame_samples = sizeof frames / sizeof *frames;
+    config.part = part;
+    config.part_words = sizeof part / sizeof *part;
     fill(period * channels);
     if (frf_block_build(coefficients, sizeof coefficients / sizeof *coefficients, bins, bin_count, period, &layout,
                         &block_table) != core_ok ||
@@ -124,7 +129,8 @@ static void run_block(const char *name, uint32_t period, uint32_t last, uint32_t
     count_block_by_frames(&dft, &unused, &cost.longest_spread);
     print_case(name, channels, &cost, period * bin_count * channels,
                4u * FRF_BLOCK_STORAGE_WORDS(bin_count, channels, 1u, block, terms) +
-                   2u * FRF_BLOCK_FRAME_SAMPLES(channels, block),
+                   (repeats > 1 ? 4u * FRF_BLOCK_PART_WORDS(channels, period, repeats, block)
+                                : 2u * FRF_BLOCK_FRAME_SAMPLES(channels, block)),
                4u * FRF_BLOCK_TABLE_WORDS(bin_count, block, terms), checksum);
 }
 
@@ -186,14 +192,19 @@ int main(void)
         uint32_t count = counts[c];
         bool few = count == 32;
         for (uint32_t channels = 1; channels <= CHANNELS_MAX; ++channels) {
-            run_block(few ? "any-16-K32" : "any-16-K200", 2000, 900, count, channels, 16, 16);
-            run_block(few ? "any-32-K32" : "any-32-K200", 2000, 900, count, channels, 32, 32);
-            run_block(few ? "any-64-K32" : "any-64-K200", 2000, 900, count, channels, 64, 64);
-            run_block(few ? "any-128-K32" : "any-128-K200", 2000, 900, count, channels, 128, 128);
-            run_block(few ? "below-0.1-64-K32" : "below-0.1-64-K200", 2000, 200, count, channels, 64, 24);
-            run_block(few ? "below-0.1-128-K32" : "below-0.1-128-K200", 2000, 200, count, channels, 128, 36);
-            run_block(few ? "below-0.02-64-K32" : "below-0.02-64-K200", 16384, 327, count, channels, 64, 12);
-            run_block(few ? "below-0.02-128-K32" : "below-0.02-128-K200", 16384, 327, count, channels, 128, 12);
+            spread_bins(900, count);
+            run_block(few ? "any-16-K32" : "any-16-K200", 2000, count, channels, 16, 16, 1);
+            run_block(few ? "any-32-K32" : "any-32-K200", 2000, count, channels, 32, 32, 1);
+            run_block(few ? "any-64-K32" : "any-64-K200", 2000, count, channels, 64, 64, 1);
+            run_block(few ? "any-128-K32" : "any-128-K200", 2000, count, channels, 128, 128, 1);
+            spread_bins(200, count);
+            run_block(few ? "below-0.1-64-K32" : "below-0.1-64-K200", 2000, count, channels, 64, 24, 1);
+            run_block(few ? "below-0.1-128-K32" : "below-0.1-128-K200", 2000, count, channels, 128, 36, 1);
+            spread_bins(327, count);
+            run_block(few ? "below-0.02-64-K32" : "below-0.02-64-K200", 16384, count, channels, 64, 12, 1);
+            run_block(few ? "below-0.02-128-K32" : "below-0.02-128-K200", 16384, count, channels, 128, 12, 1);
+            odd_bins(count);
+            run_block(few ? "odd-32-K32" : "odd-32-K200", 2000, count, channels, 32, 32, 2);
         }
     }
     port_exit(0);

@@ -35,9 +35,9 @@ size_t fit_residual(const struct fit_data *data, const struct sim_model *model, 
 /// best so far.
 bool fit_run(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis, size_t iterations);
 
-/// The same without derivatives and covariance at the end: a look at what could be had. If `base` (NULL: nothing), which
-/// the hypothesis extends, has the same structure, derivatives by the given model's numbers, which move by a few percent
-/// at most, are taken from `base_fit`.
+/// The same without derivatives and covariance at the end: a look at what could be had. If `base` (NULL: nothing),
+/// which the hypothesis extends, has the same structure, derivatives by those numbers of the given model that move by a
+/// few percent at most are taken from `base_fit`.
 bool fit_roughly(struct fit *self, const struct fit_data *data, const struct hypothesis *base,
                  const struct fit *base_fit, struct hypothesis *io_hypothesis, size_t iterations);
 

@@ -14,8 +14,8 @@
 /// Units:     those of the signal times samples: a sine of amplitude A on bin k gives |Y| = A N / 2
 /// Range:     bins below period_samples (0 is the sum of the samples; NULL: 0 .. bin_count - 1); period_samples >= 1
 /// Errors:    false if memory is short
-/// Cost:      one complex FFT for two periods, also where few bins are wanted: a table of twiddles for direct sums takes
-///            longer to make than the FFT
+/// Cost:      one complex FFT for two periods, also where few bins are wanted: the twiddles of direct sums alone would
+///            take longer
 /// Test:      tests/unit/test_spectra.c
 bool spectra_transform_periods(const double *signal, size_t period_samples, size_t periods, const uint32_t *bins,
                                size_t bin_count, double complex *out_spectra);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// A second copy of a function for processors with AVX2, chosen by the loader; its results are the same to the last bit.
+/// A second copy of a function for processors with AVX2, chosen by the loader; its results are the same to the last
+/// bit.
 #ifndef SERVOSCOPE_NUMERIC_CLONES_H
 #define SERVOSCOPE_NUMERIC_CLONES_H
 

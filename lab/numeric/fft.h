@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /// Discrete Fourier transforms of the host side, double precision.
-/// Composite lengths go through four transforms at once, one in each lane of a vector, multiples of four twice as fast as
-/// others; lengths with a prime factor above some hundred through a convolution with a chirp, in about seven times the time
-/// of a smooth one; short ones through KissFFT's template.
+/// Composite lengths go through four transforms at once, one in each lane of a vector, multiples of four twice as fast
+/// as others; lengths with a prime factor above some hundred through a convolution with a chirp, in about seven times
+/// the time of a smooth one; short ones through KissFFT's template.
 #ifndef SERVOSCOPE_NUMERIC_FFT_H
 #define SERVOSCOPE_NUMERIC_FFT_H
 

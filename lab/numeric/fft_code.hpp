@@ -10,8 +10,8 @@ enum { fft_largest_radix = 127 };
 /// Transforms of lengths that are not multiples of four are split into so many.
 enum { fft_largest_split = 25 };
 
-/// `length` is a multiple of `split`, which is 4, or odd from 3 to fft_largest_split; what remains is at least 8 and has
-/// no prime factor above fft_largest_radix. create throws std::bad_alloc.
+/// `length` is a multiple of `split`, which is 4, or odd from 3 to fft_largest_split; what remains is at least 8 and
+/// has no prime factor above fft_largest_radix. create throws std::bad_alloc.
 struct fft_code {
     void *(*create)(std::size_t length, std::size_t split);
     void (*destroy)(void *self);

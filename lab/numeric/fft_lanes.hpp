@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 // Transforms with a vector's four lanes.
 // Included by one source file per instruction set. Everything here has internal linkage, so that the linker cannot mix
-// them, and no template of the standard library is used on a type that others use; the operations and their order are the
-// same, and so is every bit of the result.
+// them, and no template of the standard library is used on a type that others use; the operations and their order are
+// the same, and so is every bit of the result.
 #include "lab/numeric/fft_code.hpp"
 #include "lab/numeric/fft_passes.hpp"
 
@@ -100,8 +100,8 @@ class quarters_transform final : public transform
     mutable std::vector<number> work_;
 };
 
-/// Multiples m p of an odd p: a first pass of radix p makes p transforms of m points, of which four at a time have a lane
-/// each. A few lanes stay without one.
+/// Multiples m p of an odd p: a first pass of radix p makes p transforms of m points, of which four at a time have a
+/// lane each. A few lanes stay without one.
 class split_transform final : public transform
 {
   public:

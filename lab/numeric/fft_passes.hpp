@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // Passes of a decimation in frequency, in place, on four transforms at once, one in each lane of a vector.
-// A pass of radix p turns a block of n = p m numbers into p blocks of m, of which the r-th still has to be transformed to
-// become the lines k = r modulo p:
+// A pass of radix p turns a block of n = p m numbers into p blocks of m, of which the r-th still has to be transformed
+// to become the lines k = r modulo p:
 //     y_r[j] = w_n^(r j) sum_q x[j + q m] w_p^(q r),   w_n = exp(-2 pi i / n)
 // Included by fft_lanes.hpp. Everything here has internal linkage: see there.
 #ifndef SERVOSCOPE_NUMERIC_FFT_PASSES_HPP
@@ -60,8 +60,8 @@ inline void transpose(const vector &row0, const vector &row1, const vector &row2
     exchange_halves(odd01, odd23, out[1], out[3]);
 }
 
-/// Four complex numbers. Copied as vectors: left to the compiler, the copy moves in smaller pieces, and reading a vector
-/// back from those stalls.
+/// Four complex numbers. Copied as vectors: left to the compiler, the copy moves in smaller pieces, and reading a
+/// vector back from those stalls.
 struct number {
     vector re;
     vector im;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Roots of unity in the time of one multiplication: a coarse one times a fine one, each exact to the last digit, so that
-// the product is to about two.
+// Roots of unity in the time of one multiplication: a coarse one times a fine one, each exact to the last digit, so
+// that the product is to about two.
 // Included by files that are compiled for several instruction sets, hence with internal linkage.
 #ifndef SERVOSCOPE_NUMERIC_FFT_ROOTS_HPP
 #define SERVOSCOPE_NUMERIC_FFT_ROOTS_HPP

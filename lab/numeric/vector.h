@@ -8,8 +8,8 @@
 /// sum_i a_i b_i
 double vector_dot(size_t count, const double *a, const double *b);
 
-/// sum_i a_i, and sum_i a_i^2, for long vectors: several partial sums beside each other in an order of their own, because
-/// one would wait for its own last addition.
+/// sum_i a_i, and sum_i a_i^2, for long vectors: several partial sums beside each other, because one would wait for its
+/// own last addition.
 double vector_sum(size_t count, const double *a);
 double vector_power(size_t count, const double *a);
 

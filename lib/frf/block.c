@@ -6,13 +6,25 @@
 
 #include <stddef.h>
 
-/* Made up for in advance, down to half counts: the kernel takes 1/2 out of a product and 1/16 out of a block's sum; with
- * a basis twice, and the basis's own quarter. */
+/* Made up for in advance, down to half counts: the kernel takes 1/2 out of a product and 1/16 out of a block's sum;
+ * with a basis twice, and the basis's own quarter. */
 enum { folded_shift = 4, projected_shift = 11 };
 
 static uint32_t row_pairs(const struct frf_block *self)
 {
     return FRF_BLOCK_ROWS(self->table.bin_count) / 2u;
+}
+
+static enum core_status check(const struct frf_block_config *config)
+{
+    if (!config || !config->table || !config->storage || config->banks < 1 || config->banks > 2) {
+        return core_err_argument;
+    }
+    if (config->channels < 1 || config->channels > SERVOSCOPE_FRF_CHANNELS_MAX) {
+        return core_err_frf_channels;
+    }
+    bool has_rails = config->rail_low != 0 || config->rail_high != 0;
+    return has_rails && config->rail_low >= config->rail_high ? core_err_frf_rails : core_ok;
 }
 
 static enum core_status check_storage(const struct frf_block_config *config)
@@ -42,20 +54,14 @@ static void clear_part(struct frf_block *self)
 
 enum core_status frf_block_init(struct frf_block *self, const struct frf_block_config *config)
 {
-    if (!self || !config || !config->table || !config->storage || config->banks < 1 || config->banks > 2) {
-        return core_err_argument;
+    enum core_status status = self ? check(config) : core_err_argument;
+    if (status == core_ok) {
+        status = check_storage(config);
     }
-    if (config->channels < 1 || config->channels > SERVOSCOPE_FRF_CHANNELS_MAX) {
-        return core_err_frf_channels;
-    }
-    bool has_rails = config->rail_low != 0 || config->rail_high != 0;
-    if (has_rails && config->rail_low >= config->rail_high) {
-        return core_err_frf_rails;
-    }
-    enum core_status status = check_storage(config);
     if (status != core_ok) {
         return status;
     }
+    bool has_rails = config->rail_low != 0 || config->rail_high != 0;
     const struct frf_block_table *table = config->table;
     uint32_t channels = config->channels, bank_words = 2u * FRF_BLOCK_ROWS(table->bin_count) * channels;
     self->table = *table;
@@ -151,7 +157,7 @@ static void fold_part(const int32_t *frames, uint32_t channels, uint32_t block, 
     }
 }
 
-/* `frames` are the block's, but for a folded period. */
+/* `frames` are the block's; null: they are in the folded period. */
 static void prepare_work(struct frf_block *self, const int16_t *frames)
 {
     const struct frf_block_table *table = &self->table;
@@ -159,7 +165,7 @@ static void prepare_work(struct frf_block *self, const int16_t *frames)
     uint32_t shift = table->gain_shift + (table->basis ? projected_shift : folded_shift);
     for (uint32_t c = 0; c < channels; ++c) {
         int32_t *work = self->work + c * terms, *folded = table->basis ? self->folded : work;
-        if (self->part) {
+        if (!frames) {
             fold_part(self->part + self->block_start * channels + c, channels, block, shift, folded);
         } else {
             fold(frames + c, channels, block, shift, folded);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/// The DFT at the excited bins in blocks of samples: three to forty times fewer instructions than the exact table
+/// The DFT at the excited bins in blocks of samples: six to thirty times fewer instructions than the exact table
 /// (frf/dft.h), and 8 bytes a bin and channel, at 100 dB and more.
 ///
 ///     Y_k = restore_k acc_k,    acc_k <- acc_k exp(+j w_k L) + block,    w_k = 2 pi k / N
@@ -9,8 +9,9 @@
 /// bit on every machine; it differs from the exact sum by rounding: worst bin >= 100 dB below 16-bit data of 0.95 full
 /// scale in up to 200 lines, N = 2000 .. 65536 (tests/unit/test_frf_block.c prints and checks it).
 ///
-/// Instructions per sample, bin and channel on Cortex-M4 at 200 bins (./run bench firmware-dft): any lines 1.9, below
-/// 0.1 of the sampling rate 0.8, below 0.02 of it 0.3. They come in a burst every L samples, or spread over the
+/// Instructions per sample, bin and channel on Cortex-M4 at 200 bins (./run bench firmware-dft): any lines 1.9 with
+/// L = 32 (1.7: 64), below 0.1 of the sampling rate 0.7 to 0.9, below 0.02 of it 0.4, odd lines 1.1, if fed in blocks;
+/// a call per frame adds 0.3. They come in a burst every L samples, or spread over the
 /// following L (`spread`), which delays a period's result by L samples.
 ///
 /// Periods, banks, reasons and the reader's side are those of frf/dft.h. With one bank the last period stays readable

@@ -12,8 +12,8 @@ enum { half_max = FRF_BLOCK_SAMPLES_MAX / 2u };
 
 /* Of a function of unit RMS: keeps most peaks below 1 in Q31. */
 static const double basis_scale = 0.25;
-/* RMS of what a line has outside the basis. Of signals that lie in it too that only passes with the square; 1e-4 is what
- * comes through of anything above the lines, at bins N/L apart (-80 dB). */
+/* RMS of what a line has outside the basis. Of signals that lie in it too, that passes with the square only; 1e-4 is
+ * what comes through of anything above the lines, at bins N/L apart (-80 dB). */
 static const double basis_error_max = 1e-4;
 
 static int32_t q31(double value)
@@ -58,7 +58,7 @@ static void sample_line(const struct frf_block_table *table, uint32_t bin, unsig
 static void build_basis(int32_t *rows, const struct frf_block_table *table)
 {
     uint32_t block = table->layout.block_samples;
-    double function[half_max];
+    double function[half_max] = {0.0};
     double width = (double)table->bins[table->bin_count - 1u] / (double)table->period_samples;
     for (uint32_t row = 0; row < table->layout.terms / 2u; ++row) {
         rotation_of(rows, block, row)[0] = rotation_of(rows, block, row)[1] = 0;
@@ -115,7 +115,7 @@ static bool fits_q31(const double *values, uint32_t count)
 static bool build_row(int32_t *rows, int32_t *basis, const struct frf_block_table *table, uint32_t row)
 {
     uint32_t bin = table->bins[row], terms = table->layout.terms;
-    double line[half_max], factors[half_max];
+    double line[half_max] = {0.0}, factors[half_max] = {0.0};
     uint64_t block_halves = 2u * (uint64_t)bin * table->layout.block_samples;
     rotation_of(rows, terms, row)[0] = q31(cosine_of_halves(block_halves, table->period_samples));
     rotation_of(rows, terms, row)[1] = q31(sine_of_halves(block_halves, table->period_samples));
@@ -255,6 +255,33 @@ static enum core_status check(const struct frf_block_table *table)
     return status;
 }
 
+/* Everything but the storage; a status as frf_block_build() gives it. */
+static enum core_status set_up(struct frf_block_table *self, const uint32_t *bins, uint32_t bin_count,
+                               uint32_t period_samples, const struct frf_block_layout *layout)
+{
+    struct frf_block_table table = {NULL, NULL, NULL, bins, bin_count, period_samples, 0, false, *layout, 0};
+    table.layout.repeats = layout->repeats > 1u ? layout->repeats : 1u;
+    table.part_samples = period_samples / table.layout.repeats;
+    table.alternate = bin_count > 0 && bins[0] % table.layout.repeats != 0u && table.layout.repeats % 2u == 0u;
+    enum core_status status = check(&table);
+    if (status != core_ok) {
+        return status;
+    }
+    while (gain_fits(&table, table.gain_shift + 1u)) {
+        ++table.gain_shift;
+    }
+    *self = table;
+    return core_ok;
+}
+
+static void build_empty_row(int32_t *rows, uint32_t terms, uint32_t row)
+{
+    rotation_of(rows, terms, row)[0] = rotation_of(rows, terms, row)[1] = 0;
+    for (uint32_t t = 0; t < terms; ++t) {
+        *factor_of(rows, terms, row, t) = 0;
+    }
+}
+
 enum core_status frf_block_build(int32_t *storage, uint32_t words, const uint32_t *bins, uint32_t bin_count,
                                  uint32_t period_samples, const struct frf_block_layout *layout,
                                  struct frf_block_table *out_table)
@@ -262,11 +289,8 @@ enum core_status frf_block_build(int32_t *storage, uint32_t words, const uint32_
     if (!storage || !bins || !layout || !out_table) {
         return core_err_argument;
     }
-    struct frf_block_table table = {storage, NULL, NULL, bins, bin_count, period_samples, 0, false, *layout, 0};
-    table.layout.repeats = layout->repeats > 1u ? layout->repeats : 1u;
-    table.part_samples = period_samples / table.layout.repeats;
-    table.alternate = bin_count > 0 && bins[0] % table.layout.repeats != 0u && table.layout.repeats % 2u == 0u;
-    enum core_status status = check(&table);
+    struct frf_block_table table;
+    enum core_status status = set_up(&table, bins, bin_count, period_samples, layout);
     if (status != core_ok) {
         return status;
     }
@@ -275,11 +299,6 @@ enum core_status frf_block_build(int32_t *storage, uint32_t words, const uint32_
         return core_err_storage;
     }
     int32_t *restore = storage + rows * (2u + terms), *basis = terms == block ? NULL : restore + 2u * bin_count;
-    table.restore = restore;
-    table.basis = basis;
-    while (gain_fits(&table, table.gain_shift + 1u)) {
-        ++table.gain_shift;
-    }
     if (basis) {
         build_basis(basis, &table);
     }
@@ -289,12 +308,12 @@ enum core_status frf_block_build(int32_t *storage, uint32_t words, const uint32_
         }
     }
     if (rows > bin_count) {
-        rotation_of(storage, terms, bin_count)[0] = rotation_of(storage, terms, bin_count)[1] = 0;
-        for (uint32_t t = 0; t < terms; ++t) {
-            *factor_of(storage, terms, bin_count, t) = 0;
-        }
+        build_empty_row(storage, terms, bin_count);
     }
     build_restore(restore, &table);
+    table.rows = storage;
+    table.restore = restore;
+    table.basis = basis;
     *out_table = table;
     return core_ok;
 }

@@ -6,12 +6,12 @@
 ///     sum_n x[n] exp(-j w (n - (L-1)/2)) = sum_i s_i cos(w (i + 1/2)) - j sum_i d_i sin(w (i + 1/2)),
 ///     s_i, d_i = x[L/2 + i] +- x[L/2 - 1 - i]
 ///
-/// so each line costs L real products a block. Lines that are low against 1/L look alike within a block: then the sums
-/// and differences are projected once on a few functions that all lines share, and a line costs R products.
+/// so each line costs L real products a block. Lines that are low against 1/L look alike within a block: then the
+/// sums and differences are projected once on a few functions that all lines share, and a line costs R products.
 ///
-/// Lines that are all multiples of Q do not tell the Qth parts of a period apart: the parts are added up first, and only
-/// N/Q samples cost products. If the lines are all odd multiples of Q/2, every other part is subtracted (odd lines:
-/// Q = 2). That takes N/Q words of RAM per channel.
+/// Lines that are all multiples of Q do not tell the Qth parts of a period apart: the parts are added up first, and
+/// only N/Q samples cost products. If the lines are all odd multiples of Q/2, every other part is subtracted (odd
+/// lines: Q = 2). That takes N/Q words of RAM per channel.
 #ifndef SERVOSCOPE_FRF_BLOCK_TABLE_H
 #define SERVOSCOPE_FRF_BLOCK_TABLE_H
 

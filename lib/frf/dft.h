@@ -14,7 +14,7 @@
 ///
 /// (tests/unit/test_frf_dft.c prints and checks them.) Cost: 2 K C multiply-accumulates a sample for K bins and C
 /// channels; the channels share the table look-up. Feed blocks rather than single samples: a block keeps a bin's sums
-/// in registers.
+/// in registers. On cores with a long multiply frf/block.h is six to thirty times cheaper, at 100 dB.
 ///
 /// One writer (the interrupt) feeds; at the end of a period the sums are latched by switching between two banks,
 /// without a copy; one reader has a whole period's time to read the last bank and asks afterwards whether it was in

@@ -46,6 +46,21 @@ static void test_settle_counts_periods_of_a_decaying_transient(void)
     }
 }
 
+/// Chances of many lines are multiplied; a product of such deviations would be beyond the largest double.
+static void test_settle_counts_periods_of_a_transient_beyond_measure(void)
+{
+    enum { periods = 8, bins = 50 };
+    static double complex spectra[periods * bins];
+    const bool usable[periods] = {true, true, true, true, true, true, true, true};
+    double level[periods];
+    struct settle settle;
+    make_periods(spectra, periods, bins, 1e120, 1e-61, 3);
+    TEST_ASSERT_TRUE(settle_measure(spectra, periods, bins, usable, &settle, level));
+    TEST_ASSERT_EQUAL_size_t(2, settle.periods);
+    TEST_ASSERT_TRUE(settle.settled);
+    TEST_ASSERT_DOUBLE_WITHIN(1e116, 1e118, level[0]);
+}
+
 static void test_settle_leaves_nothing_out_without_a_transient(void)
 {
     enum { periods = 10, bins = 50, runs = 1000 };
@@ -129,6 +144,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_settle_counts_periods_of_a_decaying_transient);
+    RUN_TEST(test_settle_counts_periods_of_a_transient_beyond_measure);
     RUN_TEST(test_settle_leaves_nothing_out_without_a_transient);
     RUN_TEST(test_settle_stops_at_half_of_a_recording_that_never_settles);
     RUN_TEST(test_settle_looks_at_no_period_with_lost_samples);
