@@ -178,8 +178,8 @@ static struct inertia_guess guess_inertia(const struct recording *r)
 }
 
 /// Whether the torque and the acceleration have anything in common. Where a controller holds a constant speed, or the
-/// axis was held at one place after the other, the motion says nothing of the inertia, and a free one would explain it by
-/// having none of the torque act.
+/// axis was held at one place after the other, the motion says nothing of the inertia, and a free one would explain it
+/// by having none of the torque act.
 static bool accelerates(const struct inertia_guess *guess)
 {
     const double least = 0.1;

@@ -134,8 +134,9 @@ static void whiten(const struct kinematics *self, const double *spectrum, double
     }
 }
 
-/// Variance per bin of what is no noise, reversals above all: friction turns between two samples, acceleration jumps by `jump`, and a sum
-/// of speeds misses the way by jump h^2 (1/12 - u (1 - u) / 2), u the place within the sample: 0.0373 of it RMS.
+/// Variance per bin of what is no noise, reversals above all: friction turns between two samples, acceleration jumps by
+/// `jump`, and a sum of speeds misses the way by jump h^2 (1/12 - u (1 - u) / 2), u the place within the sample: 0.0373
+/// of it RMS.
 static double systematic_power(const struct evidence *e, const struct sim_model *model)
 {
     const struct recording *r = e->recording;

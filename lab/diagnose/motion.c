@@ -4,6 +4,7 @@
 #include "lab/diagnose/oddities.h"
 #include "lab/diagnose/recording.h"
 #include "lab/numeric/filter.h"
+#include "lab/numeric/least_squares.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -103,31 +104,36 @@ static struct agreement compare_speed(size_t n, const double *position, const do
     return a;
 }
 
+/// Least squares of v[i] = keep v[i-1] + share[0] d[i] + share[1] d[i-1].
+static bool fit_low_pass(size_t n, const double *derivative, const double *velocity, double out[3])
+{
+    size_t rows = n - 1;
+    double *A = malloc(4 * rows * sizeof *A);
+    if (!A)
+        return false;
+    memcpy(A, velocity, rows * sizeof *A);
+    memcpy(A + rows, derivative + 1, rows * sizeof *A);
+    memcpy(A + 2 * rows, derivative, rows * sizeof *A);
+    memcpy(A + 3 * rows, velocity + 1, rows * sizeof *A);
+    bool good = least_squares_solve(rows, 3, A, A + 3 * rows, NULL, NULL, out, NULL);
+    free(A);
+    return good;
+}
+
 /// Corner in Hz of the first-order low-pass that makes the speed column of the derivative; 0 if none does.
 static double find_low_pass(size_t n, double rate_hz, const double *derivative, const double *velocity)
 {
-    double vv = 0.0, dd = 0.0, vd = 0.0, vy = 0.0, dy = 0.0; // v[i] = keep v[i-1] + share (d[i] + d[i-1])
-    for (size_t i = 6; i + 6 < n; i++) {
-        double v = velocity[i - 1], d = derivative[i] + derivative[i - 1], y = velocity[i];
-        vv += v * v;
-        dd += d * d;
-        vd += v * d;
-        vy += v * y;
-        dy += d * y;
-    }
-    double determinant = vv * dd - vd * vd;
-    double keep = (vy * dd - dy * vd) / determinant, share = (dy * vv - vy * vd) / determinant;
-    if (!(determinant > 0.0) || !(keep > 0.0 && keep < 1.0))
+    const double alike = 0.05, unexplained = 0.01;
+    double x[3], state = velocity[0], rest = 0.0, power = 0.0;
+    if (!fit_low_pass(n, derivative, velocity, x) || !(x[0] > 0.0 && x[0] < 1.0))
         return 0.0;
-    double state = velocity[6], rest = 0.0, power = 0.0;
-    for (size_t i = 7; i + 6 < n; i++) {
-        state = keep * state + share * (derivative[i] + derivative[i - 1]);
+    for (size_t i = 1; i < n; i++) {
+        state = x[0] * state + x[1] * derivative[i] + x[2] * derivative[i - 1];
         rest += (velocity[i] - state) * (velocity[i] - state);
         power += velocity[i] * velocity[i];
     }
-    const double alike = 0.05, unexplained = 0.01;
-    bool fits = fabs(2.0 * share / (1.0 - keep) - 1.0) < alike && rest < unexplained * power;
-    return fits ? 2.0 * (1.0 - keep) / (1.0 + keep) * rate_hz / turn : 0.0;
+    bool fits = fabs((x[1] + x[2]) / (1.0 - x[0]) - 1.0) < alike && rest < unexplained * power;
+    return fits ? -log(x[0]) * rate_hz / turn : 0.0;
 }
 
 /// First-order low-passes, twice forward and twice backward: no phase shift, and steep enough that nothing of the
@@ -150,7 +156,8 @@ static void low_pass(size_t n, double omega, double *io)
 }
 
 /// Power of the low-passed difference of two columns that stays when an offset, a gain and a delay have been allowed
-/// for, and how much of that noise would account for: the scatter of periods or, without them, what white noises let through.
+/// for, and how much of that noise would account for: the scatter of periods or, without them, what white noises let
+/// through.
 static void measure_difference(size_t n, const double *difference, const double *derivative, size_t period,
                                double white, double *out_power, double *out_noise)
 {

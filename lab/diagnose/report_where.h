@@ -13,8 +13,8 @@ struct report_share {
     double samples, nominal, extended; ///< 0..1
 };
 
-/// Fills in both directions of motion, slow and fast, three parts of the travel and three of the time; returns how many.
-/// Parts without samples are left out.
+/// Fills in both directions of motion, slow and fast, three parts of the travel and three of the time; returns how
+/// many. Parts without samples are left out.
 size_t report_shares_find(const struct diagnosis_curves *curves, bool linear,
                           struct report_share out_shares[report_shares_max]);
 

@@ -344,21 +344,18 @@ static struct settle judge_leading(const struct online *self, const double compl
     struct settle self_settle = {0};
     double excess[2] = {0.0, 0.0};
     bool unsettled = true;
-    bool first = true;
     for (size_t p = 0, m = 0; p < end && (unsettled || p < 2); p++) {
-        const bool usable = m < leading->used && leading->used_periods[m] == p;
-        double level = 0.0;
-        double above = 0.0;
-        if (usable) {
-            unsettled = settle_differs(spectra + m * leading->bin_count, reference, &level, &above) && unsettled;
-            m++;
+        if (m == leading->used || leading->used_periods[m] != p) {
+            continue; // lost samples
         }
+        double level, above;
+        unsettled = settle_differs(spectra + m * leading->bin_count, reference, &level, &above) && unsettled;
         if (p < 2) {
             excess[p] = above;
         }
-        *out_first_level = usable && first ? level : *out_first_level;
-        first = first && !usable;
-        self_settle.periods = unsettled && usable ? p + 1 : self_settle.periods;
+        *out_first_level = m == 0 ? level : *out_first_level;
+        self_settle.periods = unsettled ? p + 1 : self_settle.periods;
+        m++;
     }
     self_settle.settled = self_settle.periods < end;
     if (excess[0] > 0.0 && excess[1] > 0.0) {

@@ -27,8 +27,8 @@
 /// because a JSON number cannot hold it.
 ///
 /// Effects are named as in sim/effects/; every parameter that is not a phase (0 by default) or optional (sim_parameter)
-/// has to be there, and all are totals, not differences. An effect whose parameter is a field above (viscous_friction, inertia,
-/// torque_lag ...) sets that field, over what the field itself says; belt_elasticity also makes the structure
+/// has to be there, and all are totals, not differences. An effect whose parameter is a field above (viscous_friction,
+/// inertia, torque_lag ...) sets that field, over what the field itself says; belt_elasticity also makes the structure
 /// "two_mass". An effect that this build does not know is refused: the model without it would be another drive.
 ///
 /// A linear axis uses the twins of these names and no others: motor_mass_kg (0) and mass_kg, belt_stiffness_N_per_m,

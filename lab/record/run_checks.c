@@ -313,30 +313,44 @@ static int check_steps(const struct run_checks *self, const struct text_table *t
     return error_none;
 }
 
+/* Puts the times of rows from .. end-1 between the valid ones around them; `before` is the time of the row ahead, NaN
+   if there is none, io_step_s the usual step. A time that may be right stays to the last digit. */
+static void place_times(double *time_s, const double *valid, size_t rows, size_t from, size_t end, double before,
+                        double *io_step_s)
+{
+    const double count = (double)(end - from);
+    if (isfinite(before) && end < rows) {
+        *io_step_s = (time_s[end] - before) / (count + 1.0);
+    } else if (!isfinite(before) && end < rows) {
+        if (end + 1 < rows && valid[end + 1] != 0)
+            *io_step_s = time_s[end + 1] - time_s[end];
+        before = time_s[end] - (count + 1.0) * *io_step_s;
+    }
+    if (!(*io_step_s > 0 && isfinite(before)))
+        return;
+    for (size_t row = from; row < end; row++) {
+        const double expected_s = before + (double)(row - from + 1) * *io_step_s;
+        if (!(fabs(time_s[row] - expected_s) < 0.5 * *io_step_s))
+            time_s[row] = expected_s;
+    }
+}
+
 /* A lost row's time may be anything: it is put between its neighbours' before the steps are judged. */
 static void mend_time(const struct run_checks *self, const struct text_table *table, const double *valid,
                       size_t first_row)
 {
     double *time_s = table->columns[self->time_column].data;
     double before = self->rows > 0 ? self->last_s : NAN;
-    double step = self->step_s;
+    double step_s = self->step_s;
     for (size_t n = first_row; n < table->rows; n++) {
         size_t end = n;
         while (end < table->rows && valid[end] == 0)
             end++;
         if (end > n) {
-            const double count = (double)(end - n);
-            if (end < table->rows && isfinite(before))
-                step = (time_s[end] - before) / (count + 1.0);
-            if (!isfinite(before) && end + 1 < table->rows && valid[end + 1] != 0)
-                step = time_s[end + 1] - time_s[end];
-            if (!isfinite(before) && end < table->rows)
-                before = time_s[end] - (count + 1.0) * step;
-            for (size_t row = n; row < end && step > 0 && isfinite(before); row++)
-                time_s[row] = before + (double)(row - n + 1) * step;
+            place_times(time_s, valid, table->rows, n, end, before, &step_s);
             n = end - 1;
         } else if (isfinite(before)) {
-            step = time_s[n] - before;
+            step_s = time_s[n] - before;
         }
         before = time_s[n];
     }

@@ -21,7 +21,8 @@ struct sight {
     double std;
 };
 
-/// Between neighbouring lines log |G| and phase are straight; into a gap and beyond the last line no more is said than how large it may be.
+/// Between neighbouring lines log |G| and phase are straight; into a gap and beyond the last line no more is said than
+/// how large it may be.
 static struct sight look(const struct tune_plant *plant, const double complex *response, double frequency_hz)
 {
     const double ratio_most = 1.3;

@@ -35,7 +35,8 @@ struct nyquist {
 /// - the plant's phase at the lowest line is not that of a drive (a sign that is wrong);
 /// - the known delay turns L by more than 90 degrees between two lines where |L| > 0.1, or below the lowest line: full
 ///   turns do not show on the lines;
-/// - 1 + L turns by more than 90 degrees between two lines, or L lags by 90 degrees more where |L| > 0.1, or leads by 90
+/// - 1 + L turns by more than 90 degrees between two lines, or L lags by 90 degrees more where |L| > 0.1, or leads by
+/// 90
 ///   degrees more where |L| > 0.5: a resonance or delay may hide there;
 /// - the plant's phase rises by more than 270 degrees where |L| > 0.1: the lines show a delay's turns backwards;
 /// - `measured`, and a resonance between two lines could bring L to -1 without showing on them (lab/tune/gap.h);

@@ -42,8 +42,8 @@ void setUp(void)
 
 void tearDown(void) {}
 
-static const struct frf_block_layout folded_16 = {16, 16}, folded_32 = {32, 32}, folded_64 = {64, 64};
-static const struct frf_block_layout shared_64 = {64, 24}, shared_128 = {128, 12};
+static const struct frf_block_layout folded_16 = {16, 16, 1}, folded_32 = {32, 32, 1}, folded_64 = {64, 64, 1};
+static const struct frf_block_layout shared_64 = {64, 24, 1}, shared_128 = {128, 12, 1};
 
 static void build(uint32_t period, const struct frf_block_layout *layout)
 {
@@ -476,7 +476,7 @@ static void test_block_keeps_a_period_as_long_as_its_banks_allow(void)
 static void test_block_marks_and_rails_hold_for_one_period(void)
 {
     const uint32_t period = 50;
-    const struct frf_block_layout small = {16, 16};
+    const struct frf_block_layout small = {16, 16, 1};
     struct frf_block dft;
     struct frf_block_period latched;
     spread_bins(20, 4);

@@ -181,6 +181,29 @@ static void test_motion_leaves_out_a_late_speed_column_and_says_how_late(void)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "1 samples late") ? text : strstr(text, "0.99 samples late"), text);
 }
 
+static void test_motion_names_the_low_pass_that_a_speed_column_went_through(void)
+{
+    // A first-order low-pass at 8 Hz, in the middle of the lines, settled over a period before the first row.
+    double keep = exp(-two_pi * 8.0 / rate_hz), state = 0.0;
+    for (size_t i = 0; i < period + rows; i++) {
+        state = keep * state + (1.0 - keep) * true_velocity[i % period];
+        if (i >= period)
+            velocity[i - period] = state;
+    }
+    assert_left_out();
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "low-pass at 8 Hz"), text);
+}
+
+static void test_motion_of_a_position_that_travels_has_no_jump_at_the_end(void)
+{
+    const double speed = 0.3;
+    for (size_t i = 0; i < rows; i++)
+        position[i] += speed * (double)i / rate_hz;
+    estimate(position, NULL, period);
+    for (size_t i = 4; i < rows; i++)
+        TEST_ASSERT_DOUBLE_WITHIN(1e-8, true_velocity[i] + speed, out_velocity[i]);
+}
+
 static void test_motion_keeps_a_speed_column_within_the_tolerances(void)
 {
     for (size_t i = 0; i < rows; i++)
@@ -241,6 +264,8 @@ int main(void)
     RUN_TEST(test_motion_follows_position_at_low_frequencies_when_the_speed_column_drifts);
     RUN_TEST(test_motion_leaves_out_a_speed_column_of_another_gain_and_says_so);
     RUN_TEST(test_motion_leaves_out_a_late_speed_column_and_says_how_late);
+    RUN_TEST(test_motion_names_the_low_pass_that_a_speed_column_went_through);
+    RUN_TEST(test_motion_of_a_position_that_travels_has_no_jump_at_the_end);
     RUN_TEST(test_motion_keeps_a_speed_column_within_the_tolerances);
     RUN_TEST(test_motion_takes_the_speed_column_alone_where_a_position_is_wrong_by_position);
     RUN_TEST(test_motion_keeps_a_speed_column_whose_gain_errs_both_ways_over_the_travel);

@@ -151,6 +151,35 @@ static void test_oddities_refuse_numbers_that_no_drive_has(void)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "torque RMS"), error.message);
 }
 
+enum { long_rows = 9000 };
+
+/// Whether a position with this noise is said to have none.
+static bool is_said_to_be_hushed(double noise_rad)
+{
+    struct oddities said = {0};
+    struct run longer = {.path = run.path, .rows = long_rows, .sample_rate_hz = rate_hz};
+    double *x = run_add_column(&longer, "position_rad");
+    struct recording nothing = {.filled = 0};
+    uint64_t state = 3;
+    for (size_t n = 0; n < long_rows; n++) {
+        double random = -0.5;
+        state = state * 6364136223846793005u + 1442695040888963407u;
+        random += (double)(state >> 11) / 9007199254740992.0;
+        x[n] = sin(two_pi * 7.3 * (double)n / rate_hz) + noise_rad * sqrt(12.0) * random;
+    }
+    oddities_of_run(&longer, &nothing, &said);
+    longer.path = NULL;
+    run_free(&longer);
+    return said.count == 1 && strstr(said.texts[0], "which no sensor does") != NULL;
+}
+
+static void test_oddities_say_that_a_position_has_no_noise(void)
+{
+    TEST_ASSERT_TRUE(is_said_to_be_hushed(0.0));
+    TEST_ASSERT_TRUE(is_said_to_be_hushed(2e-10)); // of a travel of 2: a tenth of what is believed
+    TEST_ASSERT_FALSE(is_said_to_be_hushed(2e-8)); // an encoder of 25 bits
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -163,6 +192,7 @@ int main(void)
     RUN_TEST(test_oddities_say_that_the_model_is_of_something_else);
     RUN_TEST(test_oddities_say_that_a_signal_is_clipped);
     RUN_TEST(test_oddities_say_that_time_stamps_wander);
+    RUN_TEST(test_oddities_say_that_a_position_has_no_noise);
     RUN_TEST(test_oddities_refuse_numbers_that_no_drive_has);
     return UNITY_END();
 }

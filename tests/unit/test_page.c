@@ -14,9 +14,7 @@
 
 /* Coordinates are written in tenths of a pixel, so half of that may be lost. */
 static const double written_px = 0.051;
-
 enum { depth_max = 32, name_max = 16 };
-
 static char *text;
 static size_t text_length;
 static FILE *out;
@@ -51,9 +49,8 @@ static const char *drawn(void)
 static size_t count_of(const char *where, const char *what)
 {
     size_t found = 0;
-    for (const char *at = strstr(where, what); at != NULL; at = strstr(at + 1, what)) {
+    for (const char *at = strstr(where, what); at != NULL; at = strstr(at + 1, what))
         found++;
-    }
     return found;
 }
 
@@ -394,13 +391,11 @@ static double signal[long_count];
 /* A spike one sample long must be seen however many samples share its pixel. */
 static void test_figure_thinning_keeps_every_extreme(void)
 {
-    for (size_t n = 0; n < long_count; n++) {
+    for (size_t n = 0; n < long_count; n++)
         signal[n] = sin(0.003 * (double)n) + 0.1 * sin(1.7 * (double)n);
-    }
     static const size_t spikes[] = {0, 777, 5000, 13131, long_count - 1};
-    for (size_t n = 0; n < sizeof spikes / sizeof spikes[0]; n++) {
+    for (size_t n = 0; n < sizeof spikes / sizeof spikes[0]; n++)
         signal[spikes[n]] = n % 2 == 0 ? 3.0 + 0.1 * (double)n : -3.0 - 0.1 * (double)n;
-    }
     struct figure_panel *panel = figure_add_panel(&figure, "torque in Nm", axis_linear);
     figure_add_line(panel, "measured", long_count, NULL, signal);
     const char *svg = drawn();
@@ -462,9 +457,8 @@ static void test_figure_thinning_spans_each_column(void)
 
 static void test_figure_draws_each_half_pixel_once(void)
 {
-    for (size_t n = 0; n < long_count; n++) {
+    for (size_t n = 0; n < long_count; n++)
         signal[n] = n % 2 == 0 ? 0.25 : 0.75;
-    }
     struct figure_panel *panel = figure_add_panel(&figure, "torque in Nm", axis_linear);
     figure_add_points(panel, "measured", long_count, NULL, signal);
     const char *svg = drawn();
@@ -764,9 +758,8 @@ static void test_figure_spans_reach_from_low_to_high(void)
     TEST_ASSERT_EQUAL(2, trace.moves);
     TEST_ASSERT_EQUAL(4, trace.count);
     const double expected[] = {2.0, 1.0, 4.0, 3.0};
-    for (size_t n = 0; n < 4; n++) {
+    for (size_t n = 0; n < 4; n++)
         TEST_ASSERT_DOUBLE_WITHIN(2.0 * written_px, to_y(frame, expected[n]), trace.at[n].y);
-    }
     assert_inside(frame);
 }
 

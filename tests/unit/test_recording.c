@@ -241,6 +241,19 @@ static void test_recording_refuses_a_constant_torque_whatever_bins_the_file_has(
     assert_refused("the torque is constant: nothing was excited");
 }
 
+static void test_recording_looks_no_further_than_its_band_whatever_bins_the_file_has(void)
+{
+    // Derivatives of samples are no speeds beyond 0.4 of the rate, and spectra end with the band.
+    static const uint32_t bins[] = {3, 8, 20, 199, 240};
+    run.bins = malloc(sizeof bins);
+    memcpy(run.bins, bins, sizeof bins);
+    run.bin_count = sizeof bins / sizeof bins[0];
+    prepare();
+    TEST_ASSERT_EQUAL_UINT(4, recording.bin_count);
+    TEST_ASSERT_EQUAL_UINT(200, recording.band);
+    TEST_ASSERT_TRUE(recording.bins[recording.bin_count - 1] <= recording.band);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -258,6 +271,7 @@ int main(void)
     RUN_TEST(test_recording_refuses_a_run_of_few_rows);
     RUN_TEST(test_recording_refuses_an_axis_that_does_not_move);
     RUN_TEST(test_recording_refuses_a_torque_that_excites_nothing);
+    RUN_TEST(test_recording_looks_no_further_than_its_band_whatever_bins_the_file_has);
     RUN_TEST(test_recording_refuses_a_constant_torque_whatever_bins_the_file_has);
     return UNITY_END();
 }

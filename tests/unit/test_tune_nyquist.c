@@ -353,9 +353,9 @@ static void test_tune_nyquist_refuses_a_known_delay_that_lines_do_not_show(void)
         double step_hz, loop_delay_s, removed_s;
         enum nyquist_verdict verdict;
     } cases[] = {
-        {1.0, 0.0, 0.0, nyquist_stable},    {1.0, 0.001, 0.0, nyquist_stable},   {1.0, 0.05, 0.0, nyquist_unstable},
-        {1.0, 1.0, 0.0, nyquist_undecided}, {1.0, 0.0, 1.0, nyquist_undecided},  {1.0, 0.5, 0.5, nyquist_undecided},
-        {1.0, 3.0, 0.0, nyquist_undecided}, {1.0, 0.9, 0.0, nyquist_undecided},  {2.0, 0.5, 0.0, nyquist_undecided},
+        {1.0, 0.0, 0.0, nyquist_stable},    {1.0, 0.001, 0.0, nyquist_stable},    {1.0, 0.05, 0.0, nyquist_unstable},
+        {1.0, 1.0, 0.0, nyquist_undecided}, {1.0, 0.0, 1.0, nyquist_undecided},   {1.0, 0.5, 0.5, nyquist_undecided},
+        {1.0, 3.0, 0.0, nyquist_undecided}, {1.0, 0.9, 0.0, nyquist_undecided},   {2.0, 0.5, 0.0, nyquist_undecided},
         {5.0, 0.2, 0.0, nyquist_undecided}, {0.125, 0.05, 0.0, nyquist_unstable},
     };
     const double crossover = known_two_pi * 30.0, inertia = 0.005;
