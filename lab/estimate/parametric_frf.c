@@ -75,7 +75,9 @@ static bool add_line(const struct periodic *recording, size_t first, size_t coun
     io_self->output[k] = output.mean;
     io_self->input_variance[k] = input.variance / periods;
     io_self->output_variance[k] = output.variance / periods;
-    io_self->output_covariance[k] = covariance;
+    // Of signals that scatter by rounding alone, rounding may carry it beyond what their variances allow.
+    double most = sqrt(io_self->input_variance[k] * io_self->output_variance[k]);
+    io_self->output_covariance[k] = cabs(covariance) > most ? covariance * (most / cabs(covariance)) : covariance;
     io_self->noise_share[k] = 1.0;
     return output.variance > pow(rounding_share * cabs(output.mean), 2.0);
 }
@@ -208,7 +210,7 @@ bool parametric_fill_frf(const struct parametric_outcome *outcome, struct frf *i
            estimate_set_key(io_frf, "parametric_order", "%s", order) &&
            estimate_set_key(io_frf, "parametric_poles", "%s", poles) &&
            estimate_set_key(io_frf, "parametric_zeros", "%s", zeros) &&
-           estimate_set_key(io_frf, "parametric_delay_s", "%.9g", shown->delay_s) &&
+           estimate_set_key(io_frf, "parametric_delay_s", "%.9g", parametric_delay_without_hold_s(shown)) &&
            (!shown->structure.delay_free ||
             estimate_set_key(io_frf, "parametric_delay_std_s", "%.3g", shown->delay_std_s)) &&
            set_fit_keys(outcome, io_frf);

@@ -82,11 +82,17 @@ void parametric_text_roots(const struct parametric_model *model, bool poles, dou
     }
 }
 
+double parametric_delay_without_hold_s(const struct parametric_model *model)
+{
+    return model->delay_s - (is_discrete(model) && model->sample_rate_hz > 0.0 ? 1.0 / model->sample_rate_hz : 0.0);
+}
+
 void parametric_text_delay_and_gain(const struct parametric_model *model, char out_text[parametric_text_size])
 {
     out_text[0] = '\0';
     if (model->structure.delay_free) {
-        append(out_text, "delay %.4g +- %.2g ms", 1e3 * model->delay_s, 1e3 * model->delay_std_s);
+        append(out_text, "delay %.4g +- %.2g ms", 1e3 * parametric_delay_without_hold_s(model),
+               1e3 * model->delay_std_s);
     } else if (model->delay_s != 0.0) {
         append(out_text, "delay %.4g ms", 1e3 * model->delay_s);
     }

@@ -20,6 +20,9 @@ void parametric_text_order(const struct parametric_model *model, char out_text[p
 void parametric_text_roots(const struct parametric_model *model, bool poles, double limit_hz,
                            char out_text[parametric_text_size]);
 
+/// Delay of a model in seconds, without the sample that a model in 1/z is late by the hold.
+double parametric_delay_without_hold_s(const struct parametric_model *model);
+
 /// "delay 0.61 +- 0.02 ms, gain at 0 Hz 3.1 +- 0.1"; "" if the model has neither.
 void parametric_text_delay_and_gain(const struct parametric_model *model, char out_text[parametric_text_size]);
 

@@ -183,15 +183,17 @@ static size_t pool_ratios(const struct parametric_weights *self, const struct pa
     return found;
 }
 
-/// Pools the noise of output and input each by itself. Returns the window, 1: not done.
+/// Pools the noise of output and input each by itself. An input whose noise does not matter has no say in whether, but
+/// is pooled too: a covariance of one line beside variances of many could be larger than these allow. Returns the
+/// window, 1: not done.
 static size_t pool_each(const struct parametric_weights *self, const struct parametric_data *data, bool input,
                         size_t window)
 {
     size_t count = data->count;
     window = find_window(self->output_variance, input ? self->input_variance : NULL, count, window, data->variance_dof);
     bool done = window > 1 && average(self->output_variance, count, window) &&
-                (!input || average(self->input_variance, count, window)) &&
-                (!input || !self->output_covariance || average_complex(self->output_covariance, count, window));
+                (!self->input_variance || average(self->input_variance, count, window)) &&
+                (!self->output_covariance || average_complex(self->output_covariance, count, window));
     return done ? window : 1;
 }
 
