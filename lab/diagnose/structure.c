@@ -228,7 +228,7 @@ static void find_burst_in(const struct evidence *e, const struct octave *o, cons
         }
     }
     double start_s = r->all.start_s + (double)(r->starts[loudest / cells] + loudest % cells * n / cells) / r->rate_hz;
-    char where[160], others[48] = "";
+    char where[240], others[48] = "";
     if (loud > 1)
         snprintf(others, sizeof others, ", and %zu more stretches", loud - 1);
     snprintf(where, sizeof where,
