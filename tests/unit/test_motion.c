@@ -64,6 +64,8 @@ static double error_rms(const double *values, const double *truth, size_t from, 
 
 static void estimate(const double *p, const double *v, size_t samples_per_period)
 {
+    free(out.kinematics);
+    out.kinematics = NULL;
     TEST_ASSERT_TRUE(motion_estimate(rows, rate_hz, p, v, samples_per_period, &out, text, sizeof text));
     TEST_ASSERT_TRUE(strlen(text) > 20 && text[strlen(text) - 1] == '.');
 }
