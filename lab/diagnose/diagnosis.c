@@ -146,6 +146,7 @@ static int prepare_recordings(const struct diagnosis_request *request, struct wo
 struct inertia_guess {
     double inertia;     ///< of a rigid body by least squares; negative: positive torque accelerates backward
     double correlation; ///< -1..1
+    double least;       ///< correlation below which nothing accelerates: more of it is chance at constant speed
     double negligible;  ///< an inertia that takes a hundredth of the torque for the accelerations there are
 };
 
@@ -172,7 +173,9 @@ static struct inertia_guess guess_inertia(const struct recording *r)
     // Where nothing accelerates at all, as in a table of places, a speed that were lost in a sample stands in for it.
     double still = 1e-6 * r->coverage.velocity_rms * r->rate_hz, any = sqrt(aa * tt);
     double acceleration = fmax(sqrt(aa / (double)b->samples), fmax(still, 1e-12));
+    const double constant = 0.95, of_turn = 0.1, of_stroke = 0.02; // friction may take nearly all of a stroke's torque
     return (struct inertia_guess){.inertia = aa > 0.0 ? ta / aa : 0.0,
+                                  .least = r->coverage.steadiness > constant ? of_turn : of_stroke,
                                   .correlation = any > 0.0 ? ta / any : 0.0,
                                   .negligible = little * r->coverage.torque_rms / acceleration};
 }
@@ -182,8 +185,7 @@ static struct inertia_guess guess_inertia(const struct recording *r)
 /// by having none of the torque act.
 static bool accelerates(const struct inertia_guess *guess)
 {
-    const double least = 0.1;
-    return fabs(guess->correlation) > least;
+    return fabs(guess->correlation) > guess->least;
 }
 
 /// The inertia at which a fit of a free one begins, or one too small to matter, which stays.
@@ -630,17 +632,25 @@ static void list_gain_ties(struct diagnosis *d)
 
 /// Without periods the noise is what a smooth black box leaves of the residual, and what that cannot follow passes for
 /// noise. The spectrum above the excitation is a second opinion: an error far above it is not explained.
-static void refuse_distance(const struct work *w, const struct diagnosis *d, struct judgement *io_judgement)
+static bool refuse_distance(const struct work *w, const struct diagnosis *d, struct judgement *io_judgement)
 {
     const double far = 4.0, large = 0.1;
     double error = d->extended.validation_nrmse;
     if (io_judgement->unexplained || w->recordings[w->fit_count].periodic || !(error > large) ||
         !(error > far * d->noise_floor_nrmse))
-        return;
+        return false;
     io_judgement->unexplained = true;
     snprintf(io_judgement->where, sizeof io_judgement->where,
              "on unseen data the error is %.2g times what the noise above the excited band would make",
              error / d->noise_floor_nrmse);
+    return true;
+}
+
+/// Share of the given model's squared excess over one (whitened) or over the noise floor that stays.
+static double share_left(double given, double left, double floor)
+{
+    double before = given * given - floor * floor, after = left * left - floor * floor;
+    return fmin(fmax(after / fmax(before, 1e-12), 0.0), 1.0);
 }
 
 static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesis *h)
@@ -664,7 +674,7 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     if (!judge_structure(&w->validate_data, &d->extended_model, &seen.over_time) ||
         !judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, &seen, &judgement))
         return false;
-    refuse_distance(w, d, &judgement);
+    bool distant = refuse_distance(w, d, &judgement);
     d->verdict = judgement.unexplained                                         ? diagnosis_unexplained
                  : judgement.count > 0 || w->recordings[0].finding.effect >= 0 ? diagnosis_explained
                                                                                : diagnosis_no_discrepancy;
@@ -674,9 +684,8 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     if (judgement.unexplained) {
         snprintf(d->where, sizeof d->where, "%s", judgement.where);
         d->unexplained_share =
-            fmin(fmax((pow(d->extended.whitened_rms, 2.0) - 1.0) / fmax(pow(d->nominal.whitened_rms, 2.0) - 1.0, 1e-12),
-                      0.0),
-                 1.0);
+            distant ? share_left(d->nominal.validation_nrmse, d->extended.validation_nrmse, d->noise_floor_nrmse)
+                    : share_left(d->nominal.whitened_rms, d->extended.whitened_rms, 1.0);
     }
     if (h->inertia_free || !judgement.unexplained) {
         d->tie_count = judge_ties(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, d->ties, diagnosis_ties_max);

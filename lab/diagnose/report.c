@@ -407,6 +407,10 @@ static void add_gain(struct page *page, const struct diagnosis *self)
         add_figures_row(page, names[2], self->extended);
     }
     page_end_table(page);
+    const char *remark = wording_refit(self);
+    if (remark) {
+        page_add_paragraph(page, "%s", remark);
+    }
 }
 
 static void add_untestable(struct page *page, const struct diagnosis *self)
@@ -421,7 +425,7 @@ static void add_untestable(struct page *page, const struct diagnosis *self)
     for (size_t i = 0; i < self->untestable_count; i++) {
         char name[wording_short];
         wording_effect(self->untestable[i].effect, name);
-        const char *cells[] = {name, self->untestable[i].why, sim_effects[self->untestable[i].effect]->measure};
+        const char *cells[] = {name, self->untestable[i].why, wording_measure(&self->untestable[i])};
         page_add_row(page, cells);
     }
     page_end_table(page);
@@ -476,9 +480,9 @@ void diagnosis_report_sections(struct page *page, const struct diagnosis *self)
     add_causes(page, self);
     add_friction(page, self);
     add_gain(page, self);
+    add_rest(page, self);
     add_untestable(page, self);
     add_next(page, self);
-    add_rest(page, self);
 }
 
 int diagnosis_report(const struct diagnosis *self, const char *path, struct error *out_error)

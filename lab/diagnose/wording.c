@@ -200,6 +200,22 @@ static bool lacks_reference(const struct diagnosis_untestable *untestable)
            strstr(untestable->why, "reference was recorded");
 }
 
+const char *wording_measure(const struct diagnosis_untestable *untestable)
+{
+    return lacks_reference(untestable) ? "what the controller asks for as well (the reference)"
+                                       : sim_effects[untestable->effect]->measure;
+}
+
+const char *wording_refit(const struct diagnosis *self)
+{
+    const double visibly = 1.1;
+    bool worse = self->refitted.validation_nrmse > visibly * self->nominal.validation_nrmse;
+    return worse ? "Refitting made the error larger: a fit weighs every frequency by its noise, this error does not. A "
+                   "wrong "
+                   "structure fits where the noise is smallest and pays for it elsewhere."
+                 : NULL;
+}
+
 /// What would show the effects not tested for; those that wait for the same column in one sentence.
 static size_t next_of_untestable(const struct diagnosis *self, size_t max, char (*out_texts)[wording_size])
 {

@@ -38,6 +38,12 @@ void wording_headline(const struct diagnosis *self, char out_text[wording_size])
 /// What the verdict is worth: how far each model is off on data the fit has not seen, and what the noise allows.
 void wording_gain(const struct diagnosis *self, char out_text[wording_size]);
 
+/// Why refitting made the error on unseen data larger, as a sentence; NULL where it did not.
+const char *wording_refit(const struct diagnosis *self);
+
+/// What to measure to test for an effect that was not tested for: a clause after "measure".
+const char *wording_measure(const struct diagnosis_untestable *untestable);
+
 /// Whether the extended model is more than the refitted one: anything was found, claimed or not.
 bool wording_is_extended(const struct diagnosis *self);
 

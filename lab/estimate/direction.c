@@ -16,6 +16,8 @@ static const double opposite = 0.6;
 static const double not_opposite = 0.4;
 /// Sensors, filters and busses lag by less; beyond an eighth of a period delays alias on a sparse grid of lines.
 static const double longest_delay_s = 0.1;
+/// Two sensors of one recording are sampled together: filters and busses part them by less.
+static const double longest_between_s = 0.01;
 static const double longest_delay_periods = 0.125;
 /// Over fewer than these the phase of a structure's own antiresonance and resonance passes for a sign.
 static const double least_span = 5.0;
@@ -82,7 +84,8 @@ struct match {
     double opposite;
 };
 
-/// Cosines over a range of delays, in steps of 1/16 turn of the highest line. Errors: false if memory is short
+/// Cosines over a range of delays, in steps of 1/16 turn of the highest line; either way between two sensors, one way
+/// from an input. Errors: false if memory is short
 static bool match_columns(const struct periodic *recording, const double complex *a, const double complex *b,
                           size_t lines, bool either_way, double complex turn, struct match *out)
 {
@@ -91,8 +94,8 @@ static bool match_columns(const struct periodic *recording, const double complex
         return true;
     }
     const double length = (double)recording->period_samples;
-    const double longest =
-        fmin(longest_delay_s * recording->run->sample_rate_hz, longest_delay_periods * length) / length;
+    const double longest_s = either_way ? longest_between_s : longest_delay_s;
+    const double longest = fmin(longest_s * recording->run->sample_rate_hz, longest_delay_periods * length) / length;
     const double step = 1.0 / (16.0 * (double)recording->bins[lines - 1]);
     const size_t steps = (size_t)(longest / step) + 1;
     const size_t before = either_way ? steps : 0;

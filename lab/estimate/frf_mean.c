@@ -86,10 +86,27 @@ static double pooled_scatter(const struct block *block, size_t lines, size_t b, 
     return (own_dof * block->input_scatter[b] + dof * median) / *out_dof;
 }
 
-static bool has_power_of_few(const struct block *block, size_t lines, size_t b, double count)
+/// The largest scatter of a block bounds every median in it: most lines need no more to be certain.
+static double certain_power_of_few(const struct block *block, size_t lines, double count)
+{
+    const double own_dof = count - 1.0;
+    const double share = 1.0 - 1.0 / (9.0 * own_dof);
+    const double fewest = (double)(lines > neighbours ? neighbours : lines - 1);
+    const double dof = own_dof * (1.0 + efficiency_of_median * fewest);
+    double largest = 0.0;
+    for (size_t b = 0; b < lines; b++) {
+        largest = block->input_scatter[b] > largest ? block->input_scatter[b] : largest;
+    }
+    return largest / (share * share * share) / own_dof * dof * expm1(-log(estimate_chance_of_dead_line) / dof);
+}
+
+static bool has_power_of_few(const struct block *block, size_t lines, size_t b, double count, double certain_power)
 {
     double dof;
     const double power_of_mean = count * power(block->input[b]);
+    if (power_of_mean > certain_power) {
+        return true;
+    }
     const double variance = pooled_scatter(block, lines, b, count - 1.0, &dof) / (count - 1.0);
     return power_of_mean > 0.0 && dof * log1p(power_of_mean / variance / dof) > -log(estimate_chance_of_dead_line);
 }
@@ -101,6 +118,7 @@ static void estimate_block(const struct periodic *recording, size_t first, size_
     double count = (double)recording->used;
     const bool few = recording->used <= few_periods;
     const double certain_ratio = circle_certain_ratio(estimate_chance_of_dead_line, recording->used);
+    double certain_power;
     sum_means(recording, first, lines, io_block);
     for (size_t b = 0; b < lines; b++) {
         /* Part by part: a quotient of complex numbers would look for infinities each time. */
@@ -110,9 +128,10 @@ static void estimate_block(const struct periodic *recording, size_t first, size_
                              (cimag(y) * creal(u) - creal(y) * cimag(u)) / power(u));
     }
     sum_scatter(recording, first, lines, responses, io_block);
+    certain_power = few ? certain_power_of_few(io_block, lines, count) : 0.0;
     for (size_t b = 0; b < lines; b++) {
         double input_power = power(io_block->input[b]);
-        if (few ? has_power_of_few(io_block, lines, b, count)
+        if (few ? has_power_of_few(io_block, lines, b, count, certain_power)
                 : count * input_power > certain_ratio * io_block->input_scatter[b] / (count - 1.0)) {
             double variance = io_block->residual[b] / (count * (count - 1.0) * input_power);
             estimate_set_line(io_frf, first + b, responses[b], sqrt(variance));

@@ -319,7 +319,15 @@ static void mean_input(const struct periodic *self, const double complex *sums, 
         largest_power = larger(largest_power, power(out_mean[b]));
     }
     largest = fmax(largest, sqrt(largest_power));
+    const double length = (double)self->period_samples;
     for (size_t b = 0; b < self->bin_count; b++) {
+        /* sin(w/2) >= w/pi; most lines stand so far above any ramp that it need not be worked out. */
+        const double most = fabs(slope) * length * length / (4.0 * (double)self->bins[b]);
+        const double clear = 4.0 * most + rounding * largest;
+        out_limit[b] = rounding * largest;
+        if (power(out_mean[b]) > clear * clear) {
+            continue;
+        }
         const double complex ramp = slope * ramp_transform(self->bins[b], self->period_samples);
         out_mean[b] -= ramp;
         out_limit[b] = larger(rounding * largest, rounding_of_ramp * sqrt(power(ramp)));

@@ -4,7 +4,6 @@
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
-#include <stdlib.h>
 
 static const double two_pi = 6.283185307179586476925;
 
@@ -189,11 +188,41 @@ double statistics_normal_cdf(double x)
     return 0.5 * erfc(-x / sqrt(2.0));
 }
 
-static int compare_doubles(const void *left, const void *right)
+static double middle_of(double a, double b, double c)
 {
-    double a = *(const double *)left;
-    double b = *(const double *)right;
-    return (a > b) - (a < b);
+    const double low = a < b ? a : b;
+    const double high = a < b ? b : a;
+    return c < low ? low : c > high ? high : c;
+}
+
+/// Reorders values so that the k-th in order has its place and none before it is larger (Hoare, Comm. ACM 4 (1961)
+/// 321).
+static double select_in_order(double *values, ptrdiff_t count, ptrdiff_t k)
+{
+    ptrdiff_t first = 0;
+    ptrdiff_t last = count - 1;
+    while (first < last) {
+        const double pivot = middle_of(values[first], values[first + (last - first) / 2], values[last]);
+        ptrdiff_t i = first;
+        ptrdiff_t j = last;
+        while (i <= j) {
+            while (values[i] < pivot) {
+                i++;
+            }
+            while (pivot < values[j]) {
+                j--;
+            }
+            if (i <= j) {
+                const double held = values[i];
+                values[i++] = values[j];
+                values[j--] = held;
+            }
+        }
+        /* Between j and i lies nothing but the pivot: k there ends the search, too. */
+        first = k > j ? i : first;
+        last = k < i ? j : last;
+    }
+    return values[k];
 }
 
 double statistics_median(double *values, size_t count)
@@ -201,8 +230,16 @@ double statistics_median(double *values, size_t count)
     if (count == 0) {
         return NAN;
     }
-    qsort(values, count, sizeof *values, compare_doubles);
-    return count % 2 ? values[count / 2] : 0.5 * (values[count / 2 - 1] + values[count / 2]);
+    const size_t half = count / 2;
+    const double upper = select_in_order(values, (ptrdiff_t)count, (ptrdiff_t)half);
+    if (count % 2) {
+        return upper;
+    }
+    double lower = values[0];
+    for (size_t i = 1; i < half; i++) {
+        lower = values[i] > lower ? values[i] : lower;
+    }
+    return 0.5 * (lower + upper);
 }
 
 void random_seed(struct random *self, uint64_t seed)

@@ -31,7 +31,7 @@ double statistics_f_quantile(double probability, double d1, double d2);
 /// Returns P(X <= x) of the standard normal distribution.
 double statistics_normal_cdf(double x);
 
-/// Returns the median (mean of the two middle values for an even count); sorts `values`. NaN if count is 0.
+/// Returns the median (mean of the two middle values for an even count); reorders `values`. NaN if count is 0.
 double statistics_median(double *values, size_t count);
 
 /// Generator xoshiro256++ (Blackman, Vigna), seeded through splitmix64. Same seed, same numbers, on every machine.

@@ -4,6 +4,7 @@
 #include "unity.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 /// Relative: 20 times the rounding of a sum of some tens of terms.
 static const double exact = 1e-12;
@@ -74,6 +75,35 @@ static void test_statistics_median_is_middle_of_sorted(void)
     TEST_ASSERT_TRUE(isnan(statistics_median(odd, 0)));
 }
 
+static int compare_doubles(const void *left, const void *right)
+{
+    const double a = *(const double *)left;
+    const double b = *(const double *)right;
+    return (a > b) - (a < b);
+}
+
+/// All lengths, values in any order, in order, against it, and with many of the same.
+static void test_statistics_median_is_that_of_sorting(void)
+{
+    enum { longest = 70, orders = 4 };
+    double values[longest];
+    double sorted[longest];
+    struct random random;
+    random_seed(&random, 5);
+    for (size_t n = 1; n <= longest * orders; n++) {
+        const size_t count = (n - 1) / orders + 1;
+        for (size_t i = 0; i < count; i++) {
+            const double draw = random_normal(&random);
+            const double in_order[orders] = {draw, (double)i, -(double)i, round(draw)};
+            values[i] = in_order[n % orders];
+            sorted[i] = values[i];
+        }
+        qsort(sorted, count, sizeof *sorted, compare_doubles);
+        const double expected = 0.5 * (sorted[(count - 1) / 2] + sorted[count / 2]);
+        TEST_ASSERT_TRUE(statistics_median(values, count) == expected);
+    }
+}
+
 static void test_random_normal_has_moments_of_a_normal(void)
 {
     enum { draws = 1000000 };
@@ -115,6 +145,7 @@ int main(void)
     RUN_TEST(test_statistics_cdf_and_tail_add_to_one);
     RUN_TEST(test_statistics_refuses_nan_and_ranges);
     RUN_TEST(test_statistics_median_is_middle_of_sorted);
+    RUN_TEST(test_statistics_median_is_that_of_sorting);
     RUN_TEST(test_random_normal_has_moments_of_a_normal);
     RUN_TEST(test_random_is_the_same_for_the_same_seed);
     return UNITY_END();
