@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: MIT
+# Manual pages and completions, made by the program itself from its --help texts when it is installed.
+include(GNUInstallDirs)
+install(CODE "
+  set(program \"$<TARGET_FILE:servoscope>\")
+  set(root \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}\")
+  function(write_output path)
+    execute_process(COMMAND \"\${program}\" \${ARGN} OUTPUT_VARIABLE text COMMAND_ERROR_IS_FATAL ANY)
+    file(WRITE \"\${root}/\${path}\" \"\${text}\")
+  endfunction()
+  write_output(${CMAKE_INSTALL_MANDIR}/man1/servoscope.1 manual)
+  foreach(source ${command_files})
+    get_filename_component(name \"\${source}\" NAME_WE)
+    string(REPLACE cmd_ \"\" name \"\${name}\")
+    write_output(${CMAKE_INSTALL_MANDIR}/man1/servoscope-\${name}.1 manual \${name})
+  endforeach()
+  write_output(${CMAKE_INSTALL_DATADIR}/bash-completion/completions/servoscope completion bash)
+  write_output(${CMAKE_INSTALL_DATADIR}/zsh/site-functions/_servoscope completion zsh)
+  write_output(${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d/servoscope.fish completion fish)
+")
