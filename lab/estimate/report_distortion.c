@@ -69,9 +69,13 @@ static bool any_known(const struct frf *frf, const double *thd_db)
     return false;
 }
 
+/// A curve without a point, odd distortion where only odd lines are excited, has no place in the legend either.
 static void add_points(struct figure_panel *panel, const char *name, const struct levels *levels, int curve,
                        enum figure_colour colour, enum figure_marker marker)
 {
+    if (levels->known[curve] == 0) {
+        return;
+    }
     struct figure_series *points =
         figure_add_points(panel, name, levels->count, levels->frequency_hz, levels->decibel[curve]);
     points->colour = colour;
@@ -100,6 +104,10 @@ static void add_levels(struct page *page, const struct levels *levels)
 
 static void add_harmonics(struct page *page, const struct levels *levels)
 {
+    if (levels->known[curve_thd] == 0) {
+        page_add_paragraph(page, "None of the %zu sines has harmonics above the noise.", levels->count);
+        return;
+    }
     struct figure figure;
     figure_start(&figure, "frequency in Hz", axis_log);
     struct figure_panel *panel = figure_add_panel(&figure, "total harmonic distortion in dB", axis_linear);
