@@ -11,11 +11,16 @@ find_package(PkgConfig REQUIRED)
 pkg_check_modules(CJSON REQUIRED IMPORTED_TARGET libcjson)
 pkg_check_modules(LAPACKE REQUIRED IMPORTED_TARGET lapacke)
 pkg_check_modules(OPENBLAS REQUIRED IMPORTED_TARGET openblas)
+pkg_check_modules(MODBUS REQUIRED IMPORTED_TARGET libmodbus)
 
 servoscope_room(drivers drivers LINKS servoscope_lib)
-servoscope_room(can drivers/can LINKS servoscope_drivers servoscope_lib)
+file(GLOB profile_files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/drivers/can/profiles/*.c)
+servoscope_registry(${PROJECT_BINARY_DIR}/generated/profiles.c "struct cia402_profile" cia402_profile_ cia402_profiles
+  "drivers/can/cia402_profile.h" ${profile_files})
+servoscope_room(can drivers/can EXTRA ${profile_files} ${PROJECT_BINARY_DIR}/generated/profiles.c
+  LINKS servoscope_drivers servoscope_lib)
 servoscope_room(modbus drivers/modbus LINKS servoscope_drivers servoscope_lib)
-servoscope_room(ports ports LINKS servoscope_can servoscope_modbus)
+servoscope_room(ports ports LINKS servoscope_can servoscope_modbus PkgConfig::MODBUS)
 
 file(GLOB effect_files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/sim/effects/*.c)
 servoscope_registry(${PROJECT_BINARY_DIR}/generated/effects.c "struct sim_effect" sim_effect_ sim_effects "sim/effect.h"

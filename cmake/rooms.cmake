@@ -24,7 +24,7 @@ function(servoscope_room name dir)
     target_link_libraries(servoscope_${name} PRIVATE servoscope_warnings servoscope_host)
   endif()
   foreach(link ${arg_LINKS})
-    if(link MATCHES "^servoscope_")
+    if(link MATCHES "^servoscope_" AND NOT TARGET ${link})
       # A room without sources yet is no target; what needs it then fails to link by the name of the missing function.
       target_link_libraries(servoscope_${name} PUBLIC $<TARGET_NAME_IF_EXISTS:${link}>)
     else()

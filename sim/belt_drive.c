@@ -88,6 +88,10 @@ static double control(struct sim_belt_drive *self, const struct sim_command *com
     const struct sim_controller *c = &self->model->controller;
     double torque = 0.0;
     double slope = self->stop_deceleration / self->model->sample_rate_hz;
+    if (self->encoder == sim_encoder_dead) {
+        self->velocity_integral = 0.0; // nothing to control with
+        return 0.0;
+    }
     switch (command->control) {
     case sim_control_off:
         self->velocity_integral = 0.0;
@@ -100,6 +104,9 @@ static double control(struct sim_belt_drive *self, const struct sim_command *com
         torque = velocity_control(
             self, c->position_gain_per_s * (command->position - position) + c->velocity_feedforward * command->velocity,
             velocity, c->torque_feedforward * command->torque);
+        break;
+    case sim_control_velocity:
+        torque = velocity_control(self, command->velocity, velocity, c->torque_feedforward * command->torque);
         break;
     case sim_control_stop:
         self->stop_velocity -= clipped(self->stop_velocity, slope);
@@ -126,6 +133,27 @@ static void hold_at_end_stops(struct sim_belt_drive *self)
     self->hit_end_stop = true;
 }
 
+/// Falsifies what the encoder says; see enum sim_encoder.
+static void disturb_encoder(struct sim_belt_drive *self, struct sim_sample *io_sample)
+{
+    switch (self->encoder) {
+    case sim_encoder_good:
+        self->encoder_onset = io_sample->position;
+        break;
+    case sim_encoder_stuck:
+        io_sample->position = self->encoder_onset;
+        io_sample->velocity = 0.0;
+        break;
+    case sim_encoder_reversed:
+        io_sample->position = 2.0 * self->encoder_onset - io_sample->position;
+        io_sample->velocity = -io_sample->velocity;
+        break;
+    case sim_encoder_dead:
+        io_sample->position = io_sample->velocity = NAN;
+        break;
+    }
+}
+
 static void sense(struct sim_belt_drive *self, const struct noise *noise, struct sim_sample *out_sample)
 {
     const struct sim_model *model = self->model;
@@ -138,6 +166,7 @@ static void sense(struct sim_belt_drive *self, const struct noise *noise, struct
     out_sample->position = quantised(model, sensed.position + noise->position);
     out_sample->velocity = filtered_velocity(self, sensed.velocity + noise->velocity);
     out_sample->load_position = quantised(model, self->plant.load_position + noise->load_position);
+    disturb_encoder(self, out_sample);
 }
 
 /// Rows that the recording lost repeat the one before, but for the reference.

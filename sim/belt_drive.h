@@ -11,10 +11,19 @@
 #include <stdint.h>
 
 enum sim_control {
-    sim_control_off,     ///< no torque
-    sim_control_cascade, ///< position reference, velocity and torque feed-forward
-    sim_control_torque,  ///< torque reference
-    sim_control_stop,    ///< velocity control to standstill: quick stop
+    sim_control_off,      ///< no torque
+    sim_control_cascade,  ///< position reference, velocity and torque feed-forward
+    sim_control_torque,   ///< torque reference
+    sim_control_stop,     ///< velocity control to standstill: quick stop
+    sim_control_velocity, ///< velocity reference, torque feed-forward
+};
+
+/// What is wrong with the motor's encoder. It acts where the signal is made: the controllers see it too.
+enum sim_encoder {
+    sim_encoder_good,
+    sim_encoder_stuck,    ///< the position at the onset for ever, no speed
+    sim_encoder_reversed, ///< counts backwards from the onset on
+    sim_encoder_dead,     ///< delivers no number; the drive then gives no torque
 };
 
 struct sim_command {
@@ -47,6 +56,8 @@ struct sim_belt_drive {
     double torque_limit;      ///< clips the reference; infinity if there is none
     double stop_deceleration; ///< of the quick-stop ramp, rad/s2 or m/s2
     bool hit_end_stop;        ///< sticky
+    enum sim_encoder encoder; ///< may be set between two samples
+    double encoder_onset;     ///< position when it last was good
 };
 
 /// Puts the drive at rest at `position`. `model` must outlive it.

@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { sim_effect_parameters_max = 4, sim_effect_scan_max = 16, sim_effects_max = 24, sim_tones_max = 8 };
+enum { sim_effect_parameters_max = 4, sim_effect_scan_max = 48, sim_effects_max = 24, sim_tones_max = 8 };
 
 /// How the motor moves at one instant. Angles in rad, or positions in m on a linear axis.
 struct sim_motion {
@@ -122,6 +122,9 @@ struct sim_effect {
     struct sim_parameter parameters[sim_effect_parameters_max];
     bool steady;  ///< `oppose` adds the same at every instant, except where the direction of motion changes
     bool in_time; ///< depends on the time since the run began, so that no two periods are alike
+    /// As long as it is small, what it does is proportional to parameter number `size`.
+    bool proportional;
+    size_t size;
 
     // What the effect does; each hook is NULL where it does nothing.
 

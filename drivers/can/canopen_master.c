@@ -81,13 +81,55 @@ enum can_status canopen_master_serve(struct canopen_master *self, uint64_t until
     return status;
 }
 
-/// Waits for the answer to a request just made; sends an abort if none comes.
-static uint32_t transfer(struct canopen_master *self, const struct can_frame *request)
+/// Sends what the transfer has to send; stops where the port has no room.
+static enum can_status send_upcoming(struct canopen_master *self)
 {
-    enum can_status status = canopen_master_send(self, request);
-    uint64_t until_us = canopen_master_time_us(self) + self->sdo_timeout_us;
-    while (status == can_ok && self->sdo.state == sdo_client_waiting && canopen_master_time_us(self) < until_us)
-        status = canopen_master_step(self, until_us);
+    struct can_frame frame;
+    while (sdo_client_upcoming(&self->sdo, &frame)) {
+        enum can_status status = canopen_master_send(self, &frame);
+        if (status != can_ok)
+            return status == can_err_full ? can_ok : status;
+        sdo_client_sent(&self->sdo);
+    }
+    return can_ok;
+}
+
+/// Serves the bus until the transfer gets on or the time-out is over; true if it got on.
+static bool wait_progress(struct canopen_master *self, uint64_t last_us)
+{
+    const uint32_t room_us = 500; // a frame or two have left the send queue by then
+    uint64_t from_us = canopen_master_time_us(self), until_us = from_us + self->sdo_timeout_us;
+    uint64_t remind_us = from_us + self->sdo_timeout_us / 2;
+    uint32_t progress = self->sdo.progress;
+    struct can_frame frame;
+    until_us = until_us < last_us ? until_us : last_us;
+    while (send_upcoming(self) == can_ok && self->sdo.state == sdo_client_waiting) {
+        uint64_t now_us = canopen_master_time_us(self);
+        if (self->sdo.progress != progress || now_us >= until_us)
+            break;
+        if (now_us >= remind_us) {
+            sdo_client_remind(&self->sdo);
+            remind_us = until_us;
+        }
+        uint64_t next_us = remind_us < until_us ? remind_us : until_us;
+        if (sdo_client_upcoming(&self->sdo, &frame) && now_us + room_us < next_us)
+            next_us = now_us + room_us;
+        if (canopen_master_step(self, next_us) != can_ok)
+            break;
+    }
+    return self->sdo.progress != progress;
+}
+
+/// Waits for the end of a transfer whose first frame is `request`, `frames` answers at most; sends an abort if it does
+/// not come.
+static uint32_t transfer(struct canopen_master *self, const struct can_frame *request, uint32_t frames)
+{
+    canopen_master_send(self, request);
+    uint64_t last_us = canopen_master_time_us(self) + (uint64_t)frames * self->sdo_timeout_us;
+    bool going = true;
+    while (going && self->status == can_ok && self->sdo.state == sdo_client_waiting)
+        going = wait_progress(self, last_us) && canopen_master_time_us(self) < last_us;
+    send_upcoming(self); // the confirmation, or the abort of a transfer that failed
     if (self->sdo.state == sdo_client_waiting) {
         struct can_frame frame = sdo_client_give_up(&self->sdo);
         canopen_master_send(self, &frame);
@@ -107,7 +149,7 @@ uint32_t canopen_master_read(struct canopen_master *self, uint16_t index, uint8_
     uint32_t abort_code = od_abort_timeout;
     for (int attempt = 0; attempt < canopen_master_sdo_attempts && worth_another(abort_code); attempt++) {
         struct can_frame request = sdo_client_upload(&self->sdo, index, subindex, size);
-        abort_code = transfer(self, &request);
+        abort_code = transfer(self, &request, 1);
     }
     if (abort_code == od_abort_none)
         *out_value = self->sdo.value;
@@ -136,7 +178,7 @@ uint32_t canopen_master_write(struct canopen_master *self, uint16_t index, uint8
     uint32_t abort_code = od_abort_timeout;
     for (int attempt = 0; attempt < canopen_master_sdo_attempts && worth_another(abort_code); attempt++) {
         struct can_frame request = sdo_client_download(&self->sdo, index, subindex, size, value);
-        abort_code = transfer(self, &request);
+        abort_code = transfer(self, &request, 1);
     }
     return abort_code;
 }
@@ -151,5 +193,45 @@ uint32_t canopen_master_write_surely(struct canopen_master *self, uint16_t index
     abort_code = canopen_master_read(self, index, subindex, size, &read);
     if (abort_code == od_abort_none && (read & mask) != (value & mask))
         return od_abort_incompatible;
+    return abort_code;
+}
+
+/// Answers that a transfer of `size` bytes takes at most.
+static uint32_t frames_of(uint32_t size)
+{
+    return size / sdo_segment_bytes + 4;
+}
+
+uint32_t canopen_master_read_data(struct canopen_master *self, uint16_t index, uint8_t subindex, uint8_t *room,
+                                  uint32_t capacity, uint32_t *out_size)
+{
+    enum sdo_method method = sdo_block;
+    uint32_t abort_code = od_abort_timeout;
+    for (int attempt = 0; attempt < canopen_master_sdo_attempts; attempt++) {
+        struct can_frame request = sdo_client_upload_data(&self->sdo, method, index, subindex, room, capacity);
+        abort_code = transfer(self, &request, frames_of(capacity));
+        if (!worth_another(abort_code) && abort_code != od_abort_crc)
+            break;
+        if (abort_code == od_abort_command)
+            method = sdo_segmented;
+    }
+    if (abort_code == od_abort_none)
+        *out_size = self->sdo.receiver.size;
+    return abort_code;
+}
+
+uint32_t canopen_master_write_data(struct canopen_master *self, uint16_t index, uint8_t subindex, const uint8_t *bytes,
+                                   uint32_t size)
+{
+    enum sdo_method method = sdo_block;
+    uint32_t abort_code = od_abort_timeout;
+    for (int attempt = 0; attempt < canopen_master_sdo_attempts; attempt++) {
+        struct can_frame request = sdo_client_download_data(&self->sdo, method, index, subindex, bytes, size);
+        abort_code = transfer(self, &request, frames_of(size));
+        if (!worth_another(abort_code) && abort_code != od_abort_crc)
+            break;
+        if (abort_code == od_abort_command)
+            method = sdo_segmented;
+    }
     return abort_code;
 }

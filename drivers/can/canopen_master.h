@@ -69,4 +69,15 @@ uint32_t canopen_master_write(struct canopen_master *self, uint16_t index, uint8
 uint32_t canopen_master_write_surely(struct canopen_master *self, uint16_t index, uint8_t subindex, uint8_t size,
                                      uint32_t value, uint32_t mask);
 
+/// Reads a string or a domain into `room`. In blocks; in segments if the server has no blocks. Waits at most
+/// canopen_master_sdo_attempts times a time-out per segment; usually a few ms. Errors: as canopen_master_read, and
+/// od_abort_memory if it does not fit.
+/// Test: tests/api/test_canopen_bus.c
+uint32_t canopen_master_read_data(struct canopen_master *self, uint16_t index, uint8_t subindex, uint8_t *room,
+                                  uint32_t capacity, uint32_t *out_size);
+
+/// Writes a string or a domain, likewise.
+uint32_t canopen_master_write_data(struct canopen_master *self, uint16_t index, uint8_t subindex, const uint8_t *bytes,
+                                   uint32_t size);
+
 #endif

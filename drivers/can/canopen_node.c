@@ -48,7 +48,24 @@ static uint32_t write_heartbeat_consumer(void *owner, const struct od_entry *ent
 
 static uint32_t write_history_count(void *owner, const struct od_entry *entry, int64_t value)
 {
+    struct canopen_node *self = owner;
+    (void)entry;
     if (value != 0) // the only thing to do with the history is to clear it
+        return od_abort_value;
+    emcy_producer_forget(&self->emcy);
+    return od_abort_none;
+}
+
+/// COB-IDs that may be written, as some masters do, but not changed.
+static uint32_t write_unchanged(void *owner, const struct od_entry *entry, int64_t value)
+{
+    const struct od_place place = {.entry = entry, .owner = owner};
+    return value == od_load(&place) ? od_abort_none : od_abort_value;
+}
+
+static uint32_t write_error_behaviour(void *owner, const struct od_entry *entry, int64_t value)
+{
+    if (value > canopen_error_stops)
         return od_abort_value;
     od_store(owner, entry, value);
     return od_abort_none;
@@ -69,6 +86,8 @@ static uint32_t write_pdo(void *owner, const struct od_entry *entry, int64_t val
         return pdo_set_entry(pdo, &self->dictionary, direction, entry->subindex, (uint32_t)value);
     if (entry->subindex == 1)
         return pdo_set_cob_id(pdo, (uint32_t)value);
+    if (entry->subindex == 3)
+        return pdo_set_inhibit_time(pdo, (uint16_t)value);
     return pdo_set_transmission_type(pdo, direction, (uint8_t)value);
 }
 
@@ -90,9 +109,12 @@ static uint32_t write_pdo(void *owner, const struct od_entry *entry, int64_t val
         index, sub, od_u8, od_readable | direction, AT(member), 0, NULL                                                \
     }
 
-#define PDO_PARAMETERS(base, pdo)                                                                                      \
-    CONSTANT(base, 0, od_u8, 2), WRITABLE(base, 1, od_u32, pdo.cob_id, write_pdo),                                     \
+#define PDO_PARAMETERS(base, highest, pdo)                                                                             \
+    CONSTANT(base, 0, od_u8, highest), WRITABLE(base, 1, od_u32, pdo.cob_id, write_pdo),                               \
         WRITABLE(base, 2, od_u8, pdo.transmission_type, write_pdo)
+
+#define TPDO_TIMES(base, pdo)                                                                                          \
+    WRITABLE(base, 3, od_u16, pdo.inhibit_100us, write_pdo), WRITABLE(base, 5, od_u16, pdo.event_ms, NULL)
 
 #define PDO_MAPPING(base, pdo)                                                                                         \
     WRITABLE(base, 0, od_u8, pdo.mapped_count, write_pdo), WRITABLE(base, 1, od_u32, pdo.mapped[0], write_pdo),        \
@@ -102,8 +124,9 @@ static uint32_t write_pdo(void *owner, const struct od_entry *entry, int64_t val
         WRITABLE(base, 8, od_u32, pdo.mapped[7], write_pdo)
 
 #define PDO(number)                                                                                                    \
-    PDO_PARAMETERS(index_rpdo + number, rpdo[number]), PDO_MAPPING(index_rpdo_mapping + number, rpdo[number]),         \
-        PDO_PARAMETERS(index_tpdo + number, tpdo[number]), PDO_MAPPING(index_tpdo_mapping + number, tpdo[number])
+    PDO_PARAMETERS(index_rpdo + number, 2, rpdo[number]), PDO_MAPPING(index_rpdo_mapping + number, rpdo[number]),      \
+        PDO_PARAMETERS(index_tpdo + number, 5, tpdo[number]), TPDO_TIMES(index_tpdo + number, tpdo[number]),           \
+        PDO_MAPPING(index_tpdo_mapping + number, tpdo[number])
 
 static const struct od_entry communication_entries[] = {
     READ_ONLY(0x1000, 0, od_u32, identity.device_type),
@@ -117,8 +140,13 @@ static const struct od_entry communication_entries[] = {
     READ_ONLY(0x1003, 6, od_u32, emcy.history[5]),
     READ_ONLY(0x1003, 7, od_u32, emcy.history[6]),
     READ_ONLY(0x1003, 8, od_u32, emcy.history[7]),
-    CONSTANT(0x1005, 0, od_u32, sync_cob_id),
+    WRITABLE(0x1005, 0, od_u32, sync_cob_id, write_unchanged),
     WRITABLE(0x1006, 0, od_u32, sync.period_us, write_sync_period),
+    WRITABLE(0x1007, 0, od_u32, sync.window_us, NULL),
+    READ_ONLY(0x1008, 0, od_string, device_name),
+    READ_ONLY(0x1009, 0, od_string, hardware_version),
+    READ_ONLY(0x100A, 0, od_string, software_version),
+    READ_ONLY(0x1014, 0, od_u32, emcy_cob_id),
     CONSTANT(0x1016, 0, od_u8, 1),
     WRITABLE(0x1016, 1, od_u32, consumer_entry, write_heartbeat_consumer),
     WRITABLE(0x1017, 0, od_u16, heartbeat_ms, write_heartbeat_period),
@@ -128,6 +156,11 @@ static const struct od_entry communication_entries[] = {
     READ_ONLY(0x1018, 3, od_u32, identity.revision),
     READ_ONLY(0x1018, 4, od_u32, identity.serial),
     WRITABLE(0x1019, 0, od_u8, sync.overflow, write_sync_overflow),
+    CONSTANT(0x1029, 0, od_u8, 1),
+    WRITABLE(0x1029, 1, od_u8, error_behaviour, write_error_behaviour),
+    CONSTANT(0x1200, 0, od_u8, 2),
+    READ_ONLY(0x1200, 1, od_u32, sdo_cob_ids[0]),
+    READ_ONLY(0x1200, 2, od_u32, sdo_cob_ids[1]),
     PDO(0),
     PDO(1),
     PDO(2),
@@ -148,15 +181,26 @@ static void set_defaults(struct canopen_node *self)
     uint8_t node_id = self->node_id;
     self->sdo = (struct sdo_server){.node_id = node_id, .dictionary = &self->dictionary};
     self->emcy = (struct emcy_producer){.node_id = node_id};
-    self->sync = (struct sync_consumer){0};
+    self->sync = (struct sync_consumer){.timeout_us = self->sync.timeout_us};
     heartbeat_producer_start(&self->producer, node_id, 0, self->now_us);
     heartbeat_consumer_start(&self->consumer, 0, 0);
     self->consumer_entry = 0;
     self->heartbeat_ms = 0;
+    self->error_behaviour = canopen_error_stays;
+    self->sync_cob_id = sync_cob_id;
+    self->emcy_cob_id = (uint32_t)emcy_cob_id + node_id;
+    self->sdo_cob_ids[0] = (uint32_t)sdo_request_cob_id + node_id;
+    self->sdo_cob_ids[1] = (uint32_t)sdo_response_cob_id + node_id;
     for (unsigned i = 0; i < pdo_per_direction; i++) {
         self->rpdo[i] = (struct pdo){.cob_id = PDO_DISABLED | (0x200 + 0x100 * i + node_id), .transmission_type = 255};
         self->tpdo[i] = (struct pdo){.cob_id = PDO_DISABLED | (0x180 + 0x100 * i + node_id), .transmission_type = 1};
     }
+}
+
+static struct od_data constant_text(const char *text)
+{
+    const char *said = text ? text : "";
+    return (struct od_data){.bytes = (const uint8_t *)said, .size = (uint32_t)strlen(said)};
 }
 
 void canopen_node_init(struct canopen_node *self, uint8_t node_id, const struct can_port *port,
@@ -167,6 +211,9 @@ void canopen_node_init(struct canopen_node *self, uint8_t node_id, const struct 
     self->port = *port;
     self->node_id = node_id;
     self->identity = *identity;
+    self->device_name = constant_text(identity->device_name);
+    self->hardware_version = constant_text(identity->hardware_version);
+    self->software_version = constant_text(identity->software_version);
     self->events = events;
     self->owner = owner;
     self->dictionary.section_count = 2;
@@ -290,6 +337,20 @@ static void send_samples(struct canopen_node *self)
         send(self, &frames[i]);
 }
 
+/// Sends the TPDOs whose values have changed or whose time has come.
+static void serve_events(struct canopen_node *self)
+{
+    if (self->state != nmt_operational)
+        return;
+    for (struct pdo *pdo = self->tpdo; pdo < &self->tpdo[pdo_per_direction]; pdo++) {
+        if (self->now_us < pdo_event_deadline_us(pdo))
+            continue;
+        struct can_frame frame = pdo_make(pdo);
+        send(self, &frame);
+        pdo_event_sent(pdo, &frame, self->now_us);
+    }
+}
+
 static void serve_sync(struct canopen_node *self, const struct can_frame *frame)
 {
     enum sync_result result = sync_consumer_take(&self->sync, frame, self->now_us);
@@ -309,6 +370,10 @@ static void serve_nmt(struct canopen_node *self, enum nmt_command command)
 {
     enum nmt_state before = self->state;
     self->state = nmt_state_after(before, command);
+    if (self->state == nmt_stopped)
+        self->sdo.state = sdo_server_idle;
+    for (unsigned i = 0; i < pdo_per_direction && before != self->state; i++)
+        self->tpdo[i].sent = false;
     if (before == nmt_operational && self->state != nmt_operational) {
         self->events->connection_lost(self->owner, emcy_communication, self->now_us);
         sync_consumer_restart(&self->sync);
@@ -324,6 +389,10 @@ static void serve_nmt(struct canopen_node *self, enum nmt_command command)
 static void serve_rpdo(struct canopen_node *self, const struct can_frame *frame)
 {
     for (struct pdo *pdo = self->rpdo; pdo < &self->rpdo[pdo_per_direction]; pdo++) {
+        if (pdo_is_synchronous(pdo) && sync_consumer_window_is_over(&self->sync, self->now_us)) {
+            self->errors.targets_outside += pdo_is_enabled(pdo) && frame->id == (pdo->cob_id & can_id_max);
+            continue;
+        }
         uint32_t before = pdo->wrong_length;
         bool taken = pdo_take(pdo, frame);
         if (pdo->wrong_length != before)
@@ -333,22 +402,55 @@ static void serve_rpdo(struct canopen_node *self, const struct can_frame *frame)
     }
 }
 
+/// Sends some segments of a block upload, if their time has come and the port has room.
+static void serve_segments(struct canopen_node *self)
+{
+    struct can_frame frame;
+    if (self->now_us < self->segments_us)
+        return;
+    for (int n = 0; n < canopen_segment_burst && sdo_server_upcoming(&self->sdo, &frame); n++) {
+        self->segments_us = self->now_us + canopen_segment_gap_us;
+        if (self->port.operations->send(self->port.self, &frame) != can_ok)
+            return; // stays upcoming
+        sdo_server_sent(&self->sdo, self->now_us);
+    }
+}
+
+static void serve_sdo(struct canopen_node *self, const struct can_frame *frame)
+{
+    struct can_frame answer;
+    if (self->state == nmt_stopped)
+        return;
+    if (sdo_server_take(&self->sdo, frame, self->now_us, &answer))
+        send(self, &answer);
+    serve_segments(self);
+}
+
+static void lose_heartbeat(struct canopen_node *self)
+{
+    self->events->connection_lost(self->owner, emcy_heartbeat, self->now_us);
+    if (self->error_behaviour == canopen_error_leaves_operational && self->state == nmt_operational)
+        serve_nmt(self, nmt_enter_pre_operational);
+    else if (self->error_behaviour == canopen_error_stops)
+        serve_nmt(self, nmt_stop);
+}
+
 void canopen_node_receive(struct canopen_node *self, const struct can_frame *frame, uint64_t now_us)
 {
     self->now_us = now_us;
     enum nmt_command command = nmt_command_parse(frame, self->node_id);
     if (command != nmt_none) {
         serve_nmt(self, command);
+        serve_events(self);
         return;
     }
-    struct can_frame answer;
-    if (self->state != nmt_stopped && sdo_server_take(&self->sdo, frame, &answer))
-        send(self, &answer);
+    serve_sdo(self, frame);
     heartbeat_consumer_take(&self->consumer, frame, now_us);
     if (self->state == nmt_operational) {
         serve_sync(self, frame);
         serve_rpdo(self, frame);
     }
+    serve_events(self);
 }
 
 void canopen_node_advance(struct canopen_node *self, uint64_t now_us)
@@ -358,9 +460,13 @@ void canopen_node_advance(struct canopen_node *self, uint64_t now_us)
     if (heartbeat_producer_due(&self->producer, self->state, now_us, &frame))
         send(self, &frame);
     if (heartbeat_consumer_expired(&self->consumer, now_us))
-        self->events->connection_lost(self->owner, emcy_heartbeat, now_us);
+        lose_heartbeat(self);
     if (sync_consumer_expired(&self->sync, now_us))
         self->events->connection_lost(self->owner, emcy_sync_lost, now_us);
+    if (sdo_server_advance(&self->sdo, now_us, &frame))
+        send(self, &frame);
+    serve_segments(self);
+    serve_events(self);
 }
 
 static uint64_t earlier(uint64_t a, uint64_t b)
@@ -372,5 +478,12 @@ uint64_t canopen_node_deadline_us(const struct canopen_node *self)
 {
     uint64_t deadline_us = heartbeat_producer_deadline_us(&self->producer);
     deadline_us = earlier(deadline_us, heartbeat_consumer_deadline_us(&self->consumer));
-    return earlier(deadline_us, sync_consumer_deadline_us(&self->sync));
+    deadline_us = earlier(deadline_us, sync_consumer_deadline_us(&self->sync));
+    deadline_us = earlier(deadline_us, sdo_server_deadline_us(&self->sdo));
+    struct can_frame frame;
+    if (sdo_server_upcoming(&self->sdo, &frame))
+        deadline_us = earlier(deadline_us, self->segments_us);
+    for (unsigned i = 0; i < pdo_per_direction && self->state == nmt_operational; i++)
+        deadline_us = earlier(deadline_us, pdo_event_deadline_us(&self->tpdo[i]));
+    return deadline_us;
 }

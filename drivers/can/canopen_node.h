@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /// The communication half of a CANopen node (CiA 301): NMT, heartbeats, SYNC, EMCY, SDO server, PDOs, over an object
 /// dictionary whose application part is somebody else's. No clock: times are arguments; no waiting.
+/// Objects: 1000, 1001, 1003, 1005 (80h only), 1006, 1007, 1008, 1009, 100A, 1014, 1016, 1017, 1018, 1019, 1029, 1200,
+/// 1400..1403, 1600..1603, 1800..1803, 1A00..1A03, 2001, 2002 (pdo_check.h). There is nothing to store, so 1010 and 1011
+/// do not exist.
 /// On a SYNC it takes the set-points received before it, lets the application sample and control, and sends the TPDOs.
 #ifndef SERVOSCOPE_DRIVERS_CAN_CANOPEN_NODE_H
 #define SERVOSCOPE_DRIVERS_CAN_CANOPEN_NODE_H
@@ -30,7 +33,8 @@ struct canopen_node_events {
 };
 
 struct canopen_node_identity {
-    uint32_t device_type, vendor, product, revision, serial; ///< 1000, 1018
+    uint32_t device_type, vendor, product, revision, serial;       ///< 1000, 1018
+    const char *device_name, *hardware_version, *software_version; ///< 1008, 1009, 100A; NULL: ""
 };
 
 /// Sticky, since init.
@@ -38,8 +42,20 @@ struct canopen_node_errors {
     uint32_t targets_lost;     ///< SYNCs without a complete set of RPDOs
     uint32_t targets_rejected; ///< complete sets that were for another SYNC or failed their check
     uint32_t values_refused;   ///< mapped values out of their object's range
+    uint32_t targets_outside;  ///< synchronous RPDOs after the window (1007)
     uint32_t frames_unsent;    ///< the port took them not
 };
+
+/// What a lost heartbeat does to the NMT state (object 1029:1).
+enum canopen_error_behaviour {
+    canopen_error_leaves_operational, ///< to pre-operational
+    canopen_error_stays,              ///< after power-on: the fault is to be seen in the process data
+    canopen_error_stops,
+};
+
+/// Segments of a block upload go out in bursts, so that SYNC and process data find room in the send queue: 4 x 135 bits
+/// take 540 us at 1 Mbit/s.
+enum { canopen_segment_burst = 4, canopen_segment_gap_us = 600 };
 
 struct canopen_node {
     struct can_port port; ///< only `send` is used
@@ -56,9 +72,14 @@ struct canopen_node {
     struct emcy_producer emcy;
     struct pdo rpdo[pdo_per_direction];
     struct pdo tpdo[pdo_per_direction];
+    uint64_t segments_us; ///< when the next segments of a block upload may go out
     struct canopen_node_identity identity;
+    struct od_data device_name, hardware_version, software_version;
     uint32_t consumer_entry;              ///< 1016:1, node << 16 | ms
     uint16_t heartbeat_ms;                ///< 1017
+    uint8_t error_behaviour;              ///< 1029:1, enum canopen_error_behaviour
+    uint32_t sync_cob_id, emcy_cob_id;    ///< 1005, 1014
+    uint32_t sdo_cob_ids[2];              ///< 1200
     uint8_t sample_counter, sample_check; ///< 2001:1, :2
     uint8_t target_counter, target_check; ///< 2002:1, :2
     bool bus_was_off;

@@ -91,9 +91,65 @@ const char *cia402_state_str(enum cia402_state state)
     return "unknown";
 }
 
+struct cia402_options cia402_options_default(void)
+{
+    return (struct cia402_options){
+        .abort_connection = 1,
+        .quick_stop = 2,
+        .shutdown = 0,
+        .disable_operation = 1,
+        .halt = 1,
+        .fault_reaction = 2,
+    };
+}
+
+bool cia402_option_is_valid(uint16_t index, int64_t value)
+{
+    switch (index) {
+    case cia402_abort_connection_option:
+        return value >= 0 && value <= 3;
+    case cia402_quick_stop_option:
+        return (value >= 0 && value <= 2) || value == 5 || value == 6;
+    case cia402_shutdown_option:
+    case cia402_disable_operation_option:
+        return value == 0 || value == 1;
+    case cia402_halt_option:
+        return value == 1 || value == 2;
+    case cia402_fault_reaction_option:
+        return value >= 0 && value <= 2;
+    default:
+        return false;
+    }
+}
+
 void cia402_machine_init(struct cia402_machine *self)
 {
-    *self = (struct cia402_machine){.state = cia402_not_ready};
+    *self = (struct cia402_machine){
+        .state = cia402_not_ready, .leaving = cia402_initialised, .options = cia402_options_default()};
+}
+
+static bool stays_in_quick_stop(const struct cia402_machine *self)
+{
+    return self->options.quick_stop >= 5;
+}
+
+/// Whether an event leaves operation enabled by a ramp first.
+static bool leaves_by_ramp(const struct cia402_machine *self, enum cia402_event event)
+{
+    return (event == cia402_shutdown && self->options.shutdown != 0) ||
+           (event == cia402_switch_on && self->options.disable_operation != 0);
+}
+
+static void command_in_operation(struct cia402_machine *self, enum cia402_event event)
+{
+    if (leaves_by_ramp(self, event)) {
+        self->leaving = event;
+        return;
+    }
+    self->leaving = cia402_initialised;
+    self->state = cia402_state_after(self->state, event);
+    if (self->state == cia402_quick_stop_active && self->options.quick_stop == 0)
+        self->state = cia402_state_after(self->state, cia402_quick_stop_done);
 }
 
 bool cia402_machine_command(struct cia402_machine *self, uint16_t control_word)
@@ -105,8 +161,12 @@ bool cia402_machine_command(struct cia402_machine *self, uint16_t control_word)
         return true;
     }
     enum cia402_event event = cia402_control_decode(control_word);
-    if (self->state == cia402_quick_stop_active && event == cia402_enable_operation && !self->stays_in_quick_stop)
+    if (self->state == cia402_quick_stop_active && event == cia402_enable_operation && !stays_in_quick_stop(self))
         return false; // a stop that ends in switch-on disabled runs to its end
+    if (self->state == cia402_operation_enabled) {
+        command_in_operation(self, event);
+        return false;
+    }
     enum cia402_state before = self->state;
     self->state = cia402_state_after(before, event);
     // 1111 in ready to switch on goes through switched on by itself.
@@ -117,7 +177,57 @@ bool cia402_machine_command(struct cia402_machine *self, uint16_t control_word)
 
 void cia402_machine_event(struct cia402_machine *self, enum cia402_event event)
 {
+    bool powered = cia402_machine_is_powered(self);
     self->state = cia402_state_after(self->state, event);
+    self->leaving = cia402_initialised;
+    if (event == cia402_fault_detected && (!powered || self->options.fault_reaction == 0))
+        self->state = cia402_state_after(self->state, cia402_fault_reaction_done);
+}
+
+void cia402_machine_stood_still(struct cia402_machine *self)
+{
+    if (!cia402_machine_is_leaving(self))
+        return;
+    enum cia402_event event = self->leaving;
+    if (self->state == cia402_quick_stop_active)
+        event = cia402_quick_stop_done;
+    else if (self->state == cia402_fault_reaction_active)
+        event = cia402_fault_reaction_done;
+    self->leaving = cia402_initialised;
+    self->state = cia402_state_after(self->state, event);
+}
+
+bool cia402_machine_is_leaving(const struct cia402_machine *self)
+{
+    return self->state == cia402_fault_reaction_active ||
+           (self->state == cia402_quick_stop_active && !stays_in_quick_stop(self)) ||
+           (self->state == cia402_operation_enabled && self->leaving != cia402_initialised);
+}
+
+/// 1 and 5 are the slow-down ramp of every option code, 2 and 6 the quick-stop ramp.
+static enum cia402_action action_of_option(int16_t option)
+{
+    if (option == 0)
+        return cia402_coast;
+    return option == 1 || option == 5 ? cia402_slow_down_ramp : cia402_quick_stop_ramp;
+}
+
+enum cia402_action cia402_machine_action(const struct cia402_machine *self)
+{
+    switch (self->state) {
+    case cia402_operation_enabled:
+        if (self->leaving != cia402_initialised)
+            return cia402_slow_down_ramp;
+        if (self->control_word & cia402_control_halt)
+            return action_of_option(self->options.halt);
+        return cia402_follow_setpoints;
+    case cia402_quick_stop_active:
+        return action_of_option(self->options.quick_stop);
+    case cia402_fault_reaction_active:
+        return action_of_option(self->options.fault_reaction);
+    default:
+        return cia402_coast;
+    }
 }
 
 bool cia402_machine_is_powered(const struct cia402_machine *self)

@@ -175,6 +175,7 @@ static bool run_cycle(struct cia402_master *self)
     } else if (self->next_sync_us < now_us + self->targets_us) {
         // The caller came too late for this period: SYNC slips rather than overtaking its own set-points.
         self->next_sync_us = now_us + self->targets_us;
+        self->counters.samples_late++;
     }
     send_targets(self);
     bool in_time = canopen_master_serve(bus, self->next_sync_us) == can_ok;

@@ -17,10 +17,12 @@
 
 #include "drivers/can/canopen_master.h"
 #include "drivers/can/cia402.h"
+#include "drivers/can/cia402_profile.h"
 #include "drivers/can/cia402_scaling.h"
 #include "drivers/drive.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 struct cia402_master_options {
@@ -32,6 +34,10 @@ struct cia402_master_options {
     uint32_t arm_timeout_us;  ///< for the way to operation enabled
     uint32_t stop_timeout_us; ///< for the quick stop's ramp
     uint16_t lost_in_a_row;   ///< samples; one more ends the measurement
+    uint32_t
+        reply_patience_us; ///< waits this long for a sample, and lets the next SYNC slip; 0: only as long as SYNC keeps
+    uint32_t sync_timeout_us;             ///< after which the drive misses a SYNC; 0: 1.5 periods
+    const struct cia402_profile *profile; ///< NULL: by the drive's identity (1018)
 };
 
 /// Node 5, master 127, 1 Mbit/s, 50 ms, 100 ms, 2 s, 5 s, 5 samples.
@@ -53,6 +59,15 @@ struct cia402_cycle {
     int16_t torque, torque_demand;
 };
 
+enum { cia402_written_max = 96 };
+
+/// One object that the set-up wrote, to be read again at its end.
+struct cia402_written {
+    uint16_t index;
+    uint8_t subindex, size;
+    uint32_t value, mask;
+};
+
 struct cia402_setpoint {
     int32_t position, velocity;
     int16_t torque;
@@ -63,6 +78,7 @@ struct cia402_master {
     struct canopen_master bus;
     struct drive_configuration configuration;
     struct cia402_scaling scaling;
+    const struct cia402_profile *profile; ///< in force since open
     struct drive_counters counters;
     uint32_t saturated; ///< set-points that did not fit their object and were clipped
     bool opened, armed;
@@ -85,6 +101,8 @@ struct cia402_master {
     enum cia402_state state;  ///< of the last good status word
     uint32_t missing_in_a_row;
     uint32_t boot_ups; ///< heard when the drive was opened
+    size_t written_count;
+    struct cia402_written written[cia402_written_max];
     char detail[240];
 };
 

@@ -55,7 +55,8 @@ const char *cia402_scaling_read(const struct cia402_scaling_objects *objects, st
 
     if (objects->rated_torque == 0)
         return "rated torque (6076) is zero";
-    out_scaling->torque = (double)objects->rated_torque / 1e6; // permille of mNm
+    double units = objects->torque_units == 0 ? 1000.0 : objects->torque_units;
+    out_scaling->torque = (double)objects->rated_torque / (1e3 * units);
     return NULL;
 }
 

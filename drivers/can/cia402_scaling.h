@@ -25,6 +25,7 @@ struct cia402_scaling_objects {
     uint32_t increments, revolutions;      ///< 608F:1, :2; used if the position unit is the increment
     uint32_t position_unit, velocity_unit; ///< 60A8, 60A9
     uint32_t rated_torque;                 ///< 6076, mNm, or mN of a drive whose position unit is the metre
+    uint32_t torque_units;                 ///< that torque objects have in one rated torque; 0: 1000 (permille)
 };
 
 /// One unit of each kind of object in SI: rad, rad/s and Nm, or m, m/s and N.
@@ -34,7 +35,7 @@ struct cia402_scaling {
 };
 
 /// Reads the units; NULL, or what is missing or inconsistent as one clause.
-/// Equation: position 2 pi revolutions / increments or the SI unit; velocity the SI unit; torque 6076 / 1000 / 1000
+/// Equation: position 2 pi revolutions / increments or the SI unit; velocity the SI unit; torque 6076 / 1000 / torque units
 const char *cia402_scaling_read(const struct cia402_scaling_objects *objects, struct cia402_scaling *out_scaling);
 
 /// value / unit, rounded to the nearest whole number (halves away from zero), clipped to minimum..maximum.

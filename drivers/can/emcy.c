@@ -37,6 +37,12 @@ struct can_frame emcy_producer_raise(struct emcy_producer *self, uint16_t code, 
     return emcy_frame(self->node_id, &message);
 }
 
+void emcy_producer_forget(struct emcy_producer *self)
+{
+    self->history_count = 0;
+    memset(self->history, 0, sizeof self->history);
+}
+
 struct can_frame emcy_producer_clear(struct emcy_producer *self)
 {
     self->error_register = 0;
@@ -61,10 +67,18 @@ const char *emcy_code_str(uint16_t code)
         return "process data of a wrong length";
     case emcy_sync_length:
         return "SYNC of a wrong length";
+    case emcy_motor_blocked:
+        return "torque without motion: motor blocked or encoder stuck";
+    case emcy_encoder:
+        return "encoder without a signal";
+    case emcy_speed:
+        return "speed above its limit, or growing in a stop";
     case emcy_following_error:
         return "following error";
+    case emcy_travel:
+        return "position beyond its limit";
     case emcy_sync_lost:
-        return "SYNC missing for 1.5 periods";
+        return "SYNC missing";
     default:
         return "see the drive's manual";
     }

@@ -14,12 +14,16 @@ enum { emcy_cob_id = 0x080, emcy_history_max = 8 };
 enum emcy_code {
     emcy_no_error = 0x0000,
     emcy_parameter = 0x6320,
+    emcy_motor_blocked = 0x7121,
+    emcy_encoder = 0x7305,
     emcy_communication = 0x8100,
     emcy_heartbeat = 0x8130,
     emcy_bus_off_recovered = 0x8140,
     emcy_pdo_length = 0x8210,
     emcy_sync_length = 0x8240,
+    emcy_speed = 0x8400,
     emcy_following_error = 0x8611,
+    emcy_travel = 0x8612,
     emcy_sync_lost = 0x8700,
 };
 
@@ -52,6 +56,9 @@ bool emcy_parse(const struct can_frame *frame, uint8_t node_id, struct emcy_mess
 
 /// Records an error and makes its frame.
 struct can_frame emcy_producer_raise(struct emcy_producer *self, uint16_t code, uint8_t register_bits);
+
+/// Empties the history (object 1003).
+void emcy_producer_forget(struct emcy_producer *self);
 
 /// Clears the error register and makes the frame that says so; the history stays.
 struct can_frame emcy_producer_clear(struct emcy_producer *self);

@@ -12,9 +12,19 @@ uint8_t od_type_size(uint8_t type)
     case od_u16:
     case od_i16:
         return 2;
+    case od_string:
+    case od_domain:
+        return 0;
     default:
         return 4;
     }
+}
+
+struct od_data *od_data_of(const struct od_place *place)
+{
+    if (od_type_size(place->entry->type) != 0)
+        return NULL;
+    return (struct od_data *)(void *)((char *)place->owner + place->entry->offset);
 }
 
 static bool type_is_signed(uint8_t type)
@@ -67,6 +77,8 @@ int64_t od_load(const struct od_place *place)
     uint16_t value16;
     uint32_t value32;
     switch (od_type_size(entry->type)) {
+    case 0:
+        return 0;
     case 1:
         memcpy(&value8, from, sizeof value8);
         return od_from_raw(entry->type, value8);
@@ -86,6 +98,8 @@ void od_store(void *owner, const struct od_entry *entry, int64_t value)
     uint8_t value8 = (uint8_t)raw;
     uint16_t value16 = (uint16_t)raw;
     switch (od_type_size(entry->type)) {
+    case 0:
+        break;
     case 1:
         memcpy(to, &value8, sizeof value8);
         break;
@@ -103,7 +117,8 @@ uint32_t od_write(const struct od_place *place, int64_t value)
     const struct od_entry *entry = place->entry;
     if (entry->access & od_constant)
         return od_abort_read_only;
-    if (od_from_raw(entry->type, od_to_raw(entry->type, value)) != value)
+    bool number = od_type_size(entry->type) != 0;
+    if (number && od_from_raw(entry->type, od_to_raw(entry->type, value)) != value)
         return od_abort_value;
     if (entry->write)
         return entry->write(place->owner, entry, value);
@@ -121,6 +136,10 @@ const char *od_abort_str(uint32_t abort_code)
         {od_abort_toggle, "toggle bit not alternated"},
         {od_abort_timeout, "SDO timed out"},
         {od_abort_command, "command specifier not valid or unknown"},
+        {od_abort_block_size, "invalid block size"},
+        {od_abort_sequence, "invalid sequence number"},
+        {od_abort_crc, "CRC error"},
+        {od_abort_memory, "out of memory"},
         {od_abort_access, "unsupported access"},
         {od_abort_write_only, "object can only be written"},
         {od_abort_read_only, "object can only be read"},

@@ -10,7 +10,26 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum od_type { od_u8, od_i8, od_u16, od_i16, od_u32, od_i32 };
+enum od_type {
+    od_u8,
+    od_i8,
+    od_u16,
+    od_i16,
+    od_u32,
+    od_i32,
+    od_string, ///< VISIBLE_STRING: the owner has a struct od_data
+    od_domain, ///< DOMAIN: likewise
+};
+
+/// Where the bytes of a string or a domain are. A download goes to `room` and becomes the value when it is complete and
+/// the entry's write function, called with its size, agrees; then bytes = room. With room == bytes the old value is
+/// gone as soon as a download starts.
+struct od_data {
+    const uint8_t *bytes;
+    uint32_t size;
+    uint8_t *room; ///< NULL: cannot be written
+    uint32_t capacity;
+};
 
 enum od_access {
     od_readable = 1,
@@ -26,6 +45,10 @@ enum od_abort {
     od_abort_toggle = 0x05030000,
     od_abort_timeout = 0x05040000,
     od_abort_command = 0x05040001,
+    od_abort_block_size = 0x05040002,
+    od_abort_sequence = 0x05040003,
+    od_abort_crc = 0x05040004,
+    od_abort_memory = 0x05040005,
     od_abort_access = 0x06010000,
     od_abort_write_only = 0x06010001,
     od_abort_read_only = 0x06010002,
@@ -49,7 +72,8 @@ struct od_entry {
     uint8_t access; ///< enum od_access, or-ed
     size_t offset;  ///< of the value in the owner
     int64_t constant;
-    /// Checks and stores a value that is within the type's range; returns an abort code. NULL: od_store.
+    /// Checks and stores a value that is within the type's range; returns an abort code. NULL: od_store. Of strings and
+    /// domains the value is the size of what has come, to be found in the room of their struct od_data.
     uint32_t (*write)(void *owner, const struct od_entry *entry, int64_t value);
 };
 
@@ -72,12 +96,16 @@ struct od_place {
     void *owner;
 };
 
+/// Bytes of a number; 0 of strings and domains.
 uint8_t od_type_size(uint8_t type);
+
+/// The bytes of a string or a domain; NULL if the entry is a number.
+struct od_data *od_data_of(const struct od_place *place);
 
 /// Looks an entry up: od_abort_none, od_abort_no_object or od_abort_no_subindex.
 uint32_t od_locate(const struct object_dictionary *self, uint16_t index, uint8_t subindex, struct od_place *out_place);
 
-/// The value as it is stored, access rights aside.
+/// The number as it is stored, access rights aside; 0 of strings and domains.
 int64_t od_load(const struct od_place *place);
 
 /// Stores without any check; for `write` functions.

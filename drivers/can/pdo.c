@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "drivers/can/pdo.h"
 
+#include "drivers/can/can_port.h"
+
 #include <string.h>
 
 bool pdo_is_enabled(const struct pdo *self)
@@ -71,6 +73,7 @@ uint32_t pdo_set_cob_id(struct pdo *self, uint32_t cob_id)
     if (pdo_is_enabled(self) && !(cob_id & PDO_DISABLED) && cob_id != self->cob_id)
         return od_abort_access;
     self->cob_id = cob_id;
+    self->sent = false;
     self->pending = self->mixed = false;
     self->syncs = 0;
     return od_abort_none;
@@ -79,12 +82,19 @@ uint32_t pdo_set_cob_id(struct pdo *self, uint32_t cob_id)
 uint32_t pdo_set_transmission_type(struct pdo *self, enum pdo_direction direction, uint8_t type)
 {
     bool synchronous = type <= 240 && !(direction == pdo_transmit && type == 0);
-    bool immediate = direction == pdo_receive && type >= 254;
-    if (!synchronous && !immediate)
+    if (!synchronous && type < 254)
         return od_abort_value;
     if (pdo_is_enabled(self) && type != self->transmission_type)
         return od_abort_access;
     self->transmission_type = type;
+    return od_abort_none;
+}
+
+uint32_t pdo_set_inhibit_time(struct pdo *self, uint16_t inhibit_100us)
+{
+    if (pdo_is_enabled(self) && inhibit_100us != self->inhibit_100us)
+        return od_abort_access;
+    self->inhibit_100us = inhibit_100us;
     return od_abort_none;
 }
 
@@ -143,4 +153,32 @@ bool pdo_due(struct pdo *self)
         return false;
     self->syncs = 0;
     return true;
+}
+
+bool pdo_is_event_driven(const struct pdo *self)
+{
+    return pdo_is_enabled(self) && self->transmission_type >= 254;
+}
+
+uint64_t pdo_event_deadline_us(const struct pdo *self)
+{
+    if (!pdo_is_event_driven(self) || self->mapped_count == 0)
+        return CAN_NEVER_US;
+    if (!self->sent)
+        return 0;
+    struct can_frame frame = pdo_make(self);
+    uint64_t inhibited_us = self->last_us + self->inhibit_100us * (uint64_t)100;
+    if (memcmp(frame.data, self->data, sizeof self->data) != 0)
+        return inhibited_us;
+    if (self->event_ms == 0)
+        return CAN_NEVER_US;
+    uint64_t event_us = self->last_us + self->event_ms * (uint64_t)1000;
+    return event_us > inhibited_us ? event_us : inhibited_us;
+}
+
+void pdo_event_sent(struct pdo *self, const struct can_frame *frame, uint64_t now_us)
+{
+    memcpy(self->data, frame->data, sizeof self->data);
+    self->sent = true;
+    self->last_us = now_us;
 }

@@ -55,11 +55,16 @@ enum sync_result sync_consumer_take(struct sync_consumer *self, const struct can
     return skipped == 0 ? sync_taken : sync_gap;
 }
 
+bool sync_consumer_window_is_over(const struct sync_consumer *self, uint64_t now_us)
+{
+    return self->window_us != 0 && self->running && now_us > self->last_us + self->window_us;
+}
+
 uint64_t sync_consumer_deadline_us(const struct sync_consumer *self)
 {
     if (!self->running || self->period_us == 0)
         return CAN_NEVER_US;
-    return self->last_us + self->period_us + self->period_us / 2;
+    return self->last_us + (self->timeout_us != 0 ? self->timeout_us : self->period_us + self->period_us / 2);
 }
 
 bool sync_consumer_expired(struct sync_consumer *self, uint64_t now_us)

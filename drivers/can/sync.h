@@ -22,10 +22,12 @@ uint8_t sync_producer_upcoming(const struct sync_producer *self);
 struct can_frame sync_producer_next(struct sync_producer *self);
 
 struct sync_consumer {
-    uint32_t period_us; ///< object 1006; 0: no time-out
-    uint8_t overflow;   ///< object 1019; 0: SYNC comes without counter
-    uint8_t counter;    ///< of the last SYNC taken
-    bool running;       ///< a SYNC has come and none was missed for 1.5 periods since
+    uint32_t period_us;  ///< object 1006; 0: no time-out
+    uint32_t timeout_us; ///< 0: 1.5 periods, which a bus without real-time rights cannot keep
+    uint32_t window_us;  ///< object 1007: set-points that come later after SYNC are passed over; 0: none is
+    uint8_t overflow;    ///< object 1019; 0: SYNC comes without counter
+    uint8_t counter;     ///< of the last SYNC taken
+    bool running;        ///< a SYNC has come and none was missed for the time-out since
     uint64_t last_us;
     uint32_t missed;    ///< SYNCs that did not come, by the counter's gaps
     uint32_t repeated;  ///< SYNCs that came twice or out of order
@@ -40,12 +42,15 @@ enum sync_result {
     sync_malformed, ///< a SYNC of a wrong length: not to be acted on
 };
 
-/// Forgets what came before; keeps period and overflow.
+/// Whether the time after the last SYNC in which set-points for the next one may come is over.
+bool sync_consumer_window_is_over(const struct sync_consumer *self, uint64_t now_us);
+
+/// Forgets what came before; keeps period, time-out and overflow.
 void sync_consumer_restart(struct sync_consumer *self);
 
 enum sync_result sync_consumer_take(struct sync_consumer *self, const struct can_frame *frame, uint64_t now_us);
 
-/// When the next SYNC counts as lost: 1.5 periods after the last one.
+/// When the next SYNC counts as lost: the time-out after the last one.
 uint64_t sync_consumer_deadline_us(const struct sync_consumer *self);
 
 /// True once, when that time has come; then waits for a first SYNC again.

@@ -6,6 +6,7 @@
 #include "lab/diagnose/hold.h"
 #include "lab/diagnose/judge.h"
 #include "lab/diagnose/recording.h"
+#include "lab/diagnose/repeat.h"
 #include "lab/diagnose/search.h"
 #include "lab/diagnose/validate.h"
 #include "lab/diagnose/wording.h"
@@ -26,6 +27,8 @@ struct work {
     struct run parts[2]; ///< of a run of which a part is held back; columns borrow the run's values
     size_t held_from;    ///< row at which the part begins that is held back
     struct fit fit;
+    struct search_memo memo; ///< of fit_data
+    struct repeat repeat; ///< of the fit's parameters, on the validation data
 };
 
 static void work_free(struct work *w)
@@ -320,7 +323,7 @@ static int prepare_evidence(struct work *w, const struct diagnosis *d, struct er
     for (size_t i = 0; i < w->fit_count + w->validate_count; i++)
         if (!evidence_init(&w->evidence[i], &w->recordings[i], inertia))
             return error_set(out_error, error_refused, "not enough memory");
-    w->fit_data = (struct fit_data){.runs = w->fit_count, .evidence = w->evidence};
+    w->fit_data = (struct fit_data){.runs = w->fit_count, .evidence = w->evidence, .memo = &w->memo};
     w->validate_data = (struct fit_data){.runs = w->validate_count, .evidence = w->evidence + w->fit_count};
     for (size_t i = 0; i < w->fit_count; i++) {
         w->fit_data.values += w->evidence[i].values;
@@ -466,7 +469,7 @@ static bool find_causes(const struct diagnosis_request *request, struct work *w,
         return false;
     d->refitted_model = model;
     struct search_options options = {.causes_max = 6, .progress = request->progress, .user = request->user};
-    for (int pass = 0; pass < 4; pass++) {
+    for (size_t pass = 0; pass < 2 * options.causes_max; pass++) {
         struct hypothesis before = *h;
         if ((pass > 0 && !refine_gain(w, d, h, &step)) || !estimate_fit_noise(w, &model) ||
             !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
@@ -508,6 +511,15 @@ static void add_finding(const struct recording *r, struct diagnosis *d)
     }
 }
 
+/// Residuals whose mean square is above one carry more than noise, and other data may give other numbers: the
+/// deviations grow with both.
+static void widen_deviations(const struct work *w, const struct diagnosis *d, int effect, double *io_deviations)
+{
+    double misfit = sqrt(fmax(d->fit_misfit, 1.0));
+    for (size_t i = 0; i < sim_effects[effect]->parameter_count; i++)
+        io_deviations[i] = hypot(misfit * io_deviations[i], sqrt(w->repeat.variance[effect][i]));
+}
+
 static void describe_cause(const struct work *w, const struct diagnosis *d, const struct hypothesis *h, int effect,
                            struct diagnosis_cause *out)
 {
@@ -519,10 +531,7 @@ static void describe_cause(const struct work *w, const struct diagnosis *d, cons
     for (size_t i = 0; i < e->parameter_count; i++)
         if (e->parameters[i].model_offset != SIZE_MAX)
             memcpy(&out->nominal[i], (const char *)&d->given + e->parameters[i].model_offset, sizeof(double));
-    // Residuals whose mean square is above one carry more than noise: the deviations grow with it.
-    double misfit = sqrt(fmax(d->fit_misfit, 1.0));
-    for (size_t i = 0; i < e->parameter_count; i++)
-        out->deviations[i] *= misfit;
+    widen_deviations(w, d, effect, out->deviations);
     struct sim_finding finding = {out->values, out->deviations, out->nominal, d->linear};
     e->say(&finding, out->says, sizeof out->says);
     wording_in_units(d, sizeof out->says, out->says);
@@ -584,6 +593,7 @@ static void list_deviations(const struct work *w, struct diagnosis *d, const str
             continue;
         double values[sim_effect_parameters_max] = {0}, deviations[sim_effect_parameters_max] = {0};
         hypothesis_parameters(h, e, w->fit.covariance, values, deviations);
+        widen_deviations(w, d, e, deviations);
         for (size_t i = 0; i < sim_effects[e]->parameter_count; i++) {
             const struct sim_parameter *p = &sim_effects[e]->parameters[i];
             model_deviations_add(&d->deviations, p->model_offset == SIZE_MAX ? sim_effects[e]->id : NULL,
@@ -658,21 +668,23 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     // The noise of the validation data under the extended model; one set of weights for all three models.
     if (!estimate_validation_noise(w, h, &d->extended_model))
         return false;
-    bool in_time = contrast_concerns(&d->extended_model);
-    d->nominal = validate_figures(&w->validate_data, &d->given, in_time);
-    d->refitted = validate_figures(&w->validate_data, &d->refitted_model, in_time);
-    d->extended = validate_figures(&w->validate_data, &d->extended_model, in_time);
+    d->nominal = validate_figures(&w->validate_data, &d->given);
+    d->refitted = validate_figures(&w->validate_data, &d->refitted_model);
+    d->extended = validate_figures(&w->validate_data, &d->extended_model);
+    d->mean_rms_chance = validate_mean_rms_chance(&w->validate_data);
     d->noise_floor_nrmse = validate_noise_floor(&w->validate_data, &d->extended_model);
     struct judgement judgement;
     // An effect that cannot show in the validation data changes nothing there; one that spoils it is a wrong name.
     const double clearly = 1.2;
     struct judge_validation seen = {
-        .whitened_rms = d->extended.whitened_rms,
+        .mean_rms = d->extended.mean_rms,
         .worse = d->extended.validation_nrmse > clearly * d->refitted.validation_nrmse &&
                  d->extended.validation_nrmse > clearly * d->noise_floor_nrmse,
     };
     if (!judge_structure(&w->validate_data, &d->extended_model, &seen.over_time) ||
         !judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, &seen, &judgement))
+        return false;
+    if (!repeat_compare(&w->fit_data, h, &w->fit, &w->validate_data, &w->repeat))
         return false;
     bool distant = refuse_distance(w, d, &judgement);
     d->verdict = judgement.unexplained                                         ? diagnosis_unexplained
@@ -685,7 +697,7 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
         snprintf(d->where, sizeof d->where, "%s", judgement.where);
         d->unexplained_share =
             distant ? share_left(d->nominal.validation_nrmse, d->extended.validation_nrmse, d->noise_floor_nrmse)
-                    : share_left(d->nominal.whitened_rms, d->extended.whitened_rms, 1.0);
+                    : share_left(d->nominal.mean_rms, d->extended.mean_rms, 1.0);
     }
     if (h->inertia_free || !judgement.unexplained) {
         d->tie_count = judge_ties(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, d->ties, diagnosis_ties_max);

@@ -42,7 +42,8 @@ struct diagnosis_untestable {
 /// How well one model does on the validation data.
 struct diagnosis_figures {
     double validation_nrmse; ///< torque that the model lacks or misplaces, over the measured torque's RMS; validate.h
-    double whitened_rms;     ///< one-step prediction errors over their expected standard deviation
+    double whitened_rms;     ///< one-step prediction errors over their expected standard deviation, all periods
+    double mean_rms;         ///< the same of the mean of the periods, where noise hides less of what is wrong
 };
 
 /// Curves for the report, from the validation data. All arrays are owned and have the stated number of values.
@@ -78,6 +79,7 @@ struct diagnosis {
     struct diagnosis_untestable untestable[sim_effects_max];
     struct diagnosis_figures nominal, refitted, extended;
     double noise_floor_nrmse;
+    double mean_rms_chance;   ///< what the noise lets a perfect model's mean_rms exceed once in twenty
     double fit_misfit;        ///< mean squared whitened residual of the extended model on the fit runs, 1 is perfect
     char where[300];          ///< unexplained: in words, empty otherwise
     double unexplained_share; ///< of the nominal model's misfit, 0..1

@@ -88,7 +88,8 @@ static bool add_figures(cJSON *root, const char *name, const struct diagnosis_fi
 {
     cJSON *object = cJSON_AddObjectToObject(root, name);
     return object && add_number(object, "validation_nrmse", figures->validation_nrmse) &&
-           add_number(object, "whitened_rms", figures->whitened_rms);
+           add_number(object, "whitened_rms", figures->whitened_rms) &&
+           add_number(object, "mean_rms", figures->mean_rms);
 }
 
 static bool add_unexplained(cJSON *root, const struct diagnosis *self)
@@ -158,7 +159,8 @@ cJSON *diagnosis_json(const struct diagnosis *self)
               add_causes(root, "candidates", self->candidates, self->candidate_count, self) && add_ties(root, self) &&
               add_untestable(root, self) && add_figures(root, "nominal", &self->nominal) &&
               add_figures(root, "refitted", &self->refitted) && add_figures(root, "extended", &self->extended) &&
-              add_number(root, "noise_floor_nrmse", self->noise_floor_nrmse) && add_unexplained(root, self) &&
+              add_number(root, "noise_floor_nrmse", self->noise_floor_nrmse) &&
+              add_number(root, "mean_rms_chance", self->mean_rms_chance) && add_unexplained(root, self) &&
               add_context(root, self);
     if (!ok) {
         cJSON_Delete(root);

@@ -230,11 +230,18 @@ static bool moved(const struct hypothesis *h, const double *x)
     return false;
 }
 
+/// How far a fit is taken: all the way, or as long as there is something to be had.
+struct course {
+    size_t iterations;
+    bool finish;    ///< derivatives and covariance at the x where it ends
+    double settled; ///< of -2 log likelihood: a step that brings no more is the last
+    double goal;    ///< cost that is out of reach when `iterations` more steps like the last one do not lead below it
+};
+
 /// Tries the step to x; takes it if it improves. Returns false when there is nothing more to be had.
 static bool take_step(struct fit *self, const struct fit_data *data, struct hypothesis *h, const double *x,
-                      double *trial, double *io_damping, bool *out_taken)
+                      double *trial, double settled, double *io_damping, bool *out_taken)
 {
-    const double settled = 1e-3; // of -2 log likelihood
     size_t rows;
     double cost = residual_at(data, h, x, trial, &rows), before = self->cost;
     *out_taken = cost < before;
@@ -249,9 +256,8 @@ static bool take_step(struct fit *self, const struct fit_data *data, struct hypo
     return before - cost > settled;
 }
 
-/// Up to `iterations` steps; `finish`: derivatives and covariance at the x where it ends.
 static bool improve(struct fit *self, const struct fit_data *data, struct hypothesis *h, const struct lender *lender,
-                    size_t iterations, bool finish)
+                    const struct course *course)
 {
     size_t rows = data->values + data->contrasts;
     double *work = malloc((rows * h->count + 2 * rows) * sizeof *work);
@@ -261,16 +267,19 @@ static bool improve(struct fit *self, const struct fit_data *data, struct hypoth
     double damping = 0.0, x[hypothesis_coordinates_max];
     bool good = true, fresh = false, more = true;
     self->cost = residual_at(data, h, h->x, self->residual, &self->rows);
-    for (size_t i = 0; i < iterations && good && more; i++) {
+    for (size_t i = 0; i < course->iterations && good && more; i++) {
         if (!fresh)
             differentiate(self, data, h, lender);
         fresh = true;
         good = solve_step(self, h, damping, work, x, self->covariance);
         bool taken = false;
-        more = good && moved(h, x) && take_step(self, data, h, x, trial, &damping, &taken);
+        double before = self->cost, left = (double)(course->iterations - i - 1);
+        more = good && moved(h, x) && take_step(self, data, h, x, trial, course->settled, &damping, &taken);
+        if (taken)
+            more = more && self->cost - left * (before - self->cost) < course->goal;
         fresh = !taken;
     }
-    if (good && finish) {
+    if (good && course->finish) {
         if (!fresh)
             differentiate(self, data, h, lender);
         good = solve_step(self, h, 0.0, work, x, self->covariance);
@@ -282,15 +291,17 @@ static bool improve(struct fit *self, const struct fit_data *data, struct hypoth
 
 bool fit_run(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis, size_t iterations)
 {
-    return improve(self, data, io_hypothesis, &(struct lender){0}, iterations, true);
+    struct course course = {.iterations = iterations, .finish = true, .settled = 1e-3, .goal = INFINITY};
+    return improve(self, data, io_hypothesis, &(struct lender){0}, &course);
 }
 
 bool fit_roughly(struct fit *self, const struct fit_data *data, const struct hypothesis *base,
-                 const struct fit *base_fit, struct hypothesis *io_hypothesis, size_t iterations)
+                 const struct fit *base_fit, struct hypothesis *io_hypothesis, size_t iterations, double goal)
 {
     bool alike = base && base->engaged.structure == io_hypothesis->engaged.structure;
     struct lender lender = {alike ? base : NULL, base_fit};
-    return improve(self, data, io_hypothesis, &lender, iterations, false);
+    struct course course = {.iterations = iterations, .settled = 0.05, .goal = goal};
+    return improve(self, data, io_hypothesis, &lender, &course);
 }
 
 bool fit_step(struct fit *self, const struct fit_data *data, const struct hypothesis *base, const struct fit *base_fit,

@@ -6,12 +6,15 @@
 #include "lab/diagnose/hypothesis.h"
 #include "lab/diagnose/noise.h"
 
+struct search_memo;
+
 /// What is fitted: one or several runs of one drive.
 struct fit_data {
     size_t runs;
     const struct evidence *evidence; ///< runs of them
     size_t values;                   ///< whitened residuals of all together
-    size_t contrasts; ///< what differs between periods, for hypotheses with an effect in time; contrast.h
+    size_t contrasts;         ///< what differs between periods, for hypotheses with an effect in time; contrast.h
+    struct search_memo *memo; ///< fits that need not be repeated; NULL: none is remembered
 };
 
 struct fit {
@@ -37,9 +40,10 @@ bool fit_run(struct fit *self, const struct fit_data *data, struct hypothesis *i
 
 /// The same without derivatives and covariance at the end: a look at what could be had. If `base` (NULL: nothing),
 /// which the hypothesis extends, has the same structure, derivatives by those numbers of the given model that move by a
-/// few percent at most are taken from `base_fit`.
+/// few percent at most are taken from `base_fit`. It is given up when as much as the last step brought, in each of those
+/// that are left, would not bring the cost below `goal` (INFINITY: any will do).
 bool fit_roughly(struct fit *self, const struct fit_data *data, const struct hypothesis *base,
-                 const struct fit *base_fit, struct hypothesis *io_hypothesis, size_t iterations);
+                 const struct fit *base_fit, struct hypothesis *io_hypothesis, size_t iterations, double goal);
 
 /// One step of a hypothesis that extends `base`: derivatives by the coordinates that both share are taken from
 /// `base_fit`, only those of the new ones are computed. Leaves cost and x of the better of start and step; no

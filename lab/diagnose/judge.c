@@ -356,7 +356,7 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
     }
     const struct bench bench = {&box, data, coverage, hypothesis, fit};
     memcpy(rest, fit->residual, data->values * sizeof *rest);
-    judge_mean(&bench, validation->whitened_rms, validation->worse, rest, out_judgement);
+    judge_mean(&bench, validation->mean_rms, validation->worse, rest, out_judgement);
     bool good = look_over_time(data, fit, rest, &over_time);
     if (good) {
         structure_merge(&over_time, &validation->over_time);

@@ -19,7 +19,7 @@ struct judgement {
 
 /// What data that the fit has not seen say of the extended model.
 struct judge_validation {
-    double whitened_rms;
+    double mean_rms; ///< diagnosis_figures
     bool worse;                 ///< it errs more there than the refitted model
     struct structure over_time; ///< that it leaves there
 };

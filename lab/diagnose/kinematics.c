@@ -63,9 +63,11 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/// Smooth noise power about bin k: the mean of a scatter, the median of a spectrum that may have lines.
-static double smooth_power(const double *power, size_t bins, size_t k, bool lines, double *work)
+/// Smooth noise power about bin k: the mean of a scatter, the median of a spectrum that may have lines. The mean of the
+/// scatters of `periods` counts for a little more, by what its expected inverse is too large.
+static double smooth_power(const double *power, size_t bins, size_t k, size_t periods, double *work)
 {
+    bool lines = periods < 2;
     size_t near = k / 2 > 3 ? k / 2 : 3, reach = lines ? 15 + k / 5 : near < 10 ? near : 10;
     size_t from = k > reach ? k - reach : 1, to = k + reach < bins ? k + reach : bins, count = to - from + 1;
     if (lines) {
@@ -77,7 +79,7 @@ static double smooth_power(const double *power, size_t bins, size_t k, bool line
     double sum = 0.0;
     for (size_t i = from; i <= to; i++)
         sum += power[i];
-    return sum / (double)count;
+    return sum / ((double)count - 1.0 / (double)(periods - 1));
 }
 
 static double dot(size_t n, const double *a, const double *b)
@@ -171,7 +173,7 @@ static bool estimate(struct evidence *e, const struct sim_model *model, double *
         power[k] = power_of(difference, k);
     double added = systematic_power(e, model);
     for (size_t k = 1; k <= self->bins; k++) {
-        double smooth = smooth_power(power, self->bins, k, !r->periodic, sorted);
+        double smooth = smooth_power(power, self->bins, k, r->periodic ? r->periods : 1, sorted);
         self->weight[k] = 1.0 / sqrt(fmax(0.5 * (smooth + (r->periodic ? added : 0.0)), 1e-300));
     }
     build_basis(e, speed);

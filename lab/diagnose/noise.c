@@ -81,16 +81,23 @@ static void accumulate(double *c, const double *m, const double *a, double weigh
     c[3] += weight * (a[1] * m[0] - a[0] * m[1]);
 }
 
-/// Mean over neighbours; the number of neighbours grows with frequency in a run without periods, where lines are dense.
+/// The bins over which the noise of bin k is averaged; more with frequency in a run without periods, where lines are
+/// dense.
+static void neighbours(const struct recording *r, size_t k, size_t *out_from, size_t *out_to)
+{
+    // The noise of a measured speed grows with the square of frequency here: few neighbours at the low end.
+    size_t near = k / 2 > 2 ? k / 2 : 2;
+    size_t reach = !r->periodic ? 15 + k / 5 : near < 10 ? near : 10;
+    // Bin 0 is real: its variance is that of a complex neighbour, so it is left out of the others' means.
+    *out_from = k > reach ? k - reach : 1;
+    *out_to = k + reach < r->band ? k + reach : r->band;
+}
+
 static void smooth(const struct evidence *self, const double *raw)
 {
-    size_t band = self->recording->band;
-    for (size_t k = 0; k <= band; k++) {
-        // The noise of a measured speed grows with the square of frequency here: few neighbours at the low end.
-        size_t near = k / 2 > 2 ? k / 2 : 2;
-        size_t reach = !self->recording->periodic ? 15 + k / 5 : near < 10 ? near : 10;
-        // Bin 0 is real: its variance is that of a complex neighbour, so it is left out of the others' means.
-        size_t from = k > reach ? k - reach : 1, to = k + reach < band ? k + reach : band;
+    for (size_t k = 0; k <= self->recording->band; k++) {
+        size_t from, to;
+        neighbours(self->recording, k, &from, &to);
         for (size_t j = 0; j < 4; j++) {
             double sum = 0.0;
             for (size_t i = from; i <= to; i++)
@@ -100,23 +107,41 @@ static void smooth(const struct evidence *self, const double *raw)
     }
 }
 
+/// The expected inverse of a covariance estimated from `scatters` complex deviations is n / (n - channels) times that of
+/// the covariance (complex Wishart): without taking this back a perfect model's residual would seem larger than noise.
+/// Equation:  E |w_1|^2 = n / (n - 1),  E |w_2|^2 = n^2 / ((n - 1) (n - 2)),  w = L^-1 R, R independent of the estimate
+static void take_bias_back(const struct evidence *self, double scatters, double *io_factor)
+{
+    const double few = 0.5; // a variance of that few says nothing anyway
+    double first = fmax(scatters - 1.0, few) / scatters;
+    io_factor[0] *= sqrt(first);
+    for (size_t j = 1; self->channels == 2 && j < 4; j++)
+        io_factor[j] *= sqrt(first * fmax(scatters - 2.0, few) / scatters);
+}
+
 /// Inverse Cholesky factor per bin, for real and imaginary parts of unit variance (hence half the complex variance
 /// each).
 static void factorise(const struct evidence *self)
 {
-    for (size_t k = 0; k <= self->recording->band; k++) {
+    const struct recording *r = self->recording;
+    for (size_t k = 0; k <= r->band; k++) {
         const double *c = self->covariance + 4 * k;
         double *f = self->factor + 4 * k;
         double part = k == 0 ? 1.0 : 0.5;
         double mm = fmax(part * c[0], 1e-300);
         f[0] = 1.0 / sqrt(mm);
-        if (self->channels == 1)
-            continue;
-        double re = c[2] / fmax(c[0], 1e-300), im = c[3] / fmax(c[0], 1e-300);
-        double rest = fmax(part * c[1] - part * c[0] * (re * re + im * im), 1e-9 * part * c[1] + 1e-300);
-        f[1] = 1.0 / sqrt(rest);
-        f[2] = -re * f[1];
-        f[3] = -im * f[1];
+        size_t from, to;
+        neighbours(r, k, &from, &to);
+        if (self->channels == 2) {
+            double re = c[2] / fmax(c[0], 1e-300), im = c[3] / fmax(c[0], 1e-300);
+            double rest = fmax(part * c[1] - part * c[0] * (re * re + im * im), 1e-9 * part * c[1] + 1e-300);
+            f[1] = 1.0 / sqrt(rest);
+            f[2] = -re * f[1];
+            f[3] = -im * f[1];
+        }
+        // In a run without periods the residual is part of its own estimate, and one on the average as it is.
+        if (r->periodic)
+            take_bias_back(self, (double)(to - from + 1) * (double)(r->periods - 1), f);
     }
 }
 
@@ -249,6 +274,23 @@ static void scatter_of_periods(const struct evidence *self, const double *both, 
     }
 }
 
+/// Sum over all periods of the squares of what differs between them, whitened by the noise of one period.
+/// Equation:  sum_k 2 (P - 1) tr(C_k^-1 raw_k),  raw_k the bin's own covariance before the mean over neighbours
+static double whitened_scatter(const struct evidence *self, const double *raw)
+{
+    double sum = 0.0, free_periods = (double)self->recording->periods - 1.0;
+    sum += raw[0] / fmax(self->covariance[0], 1e-300);
+    for (size_t k = 1; k <= self->recording->band; k++) {
+        const double *c = self->covariance + 4 * k, *q = raw + 4 * k;
+        double determinant = c[0] * c[1] - c[2] * c[2] - c[3] * c[3];
+        if (self->channels == 1)
+            sum += 2.0 * q[0] / fmax(c[0], 1e-300);
+        else
+            sum += 2.0 * (c[1] * q[0] + c[0] * q[1] - 2.0 * (c[2] * q[2] + c[3] * q[3])) / fmax(determinant, 1e-300);
+    }
+    return free_periods * (sum + (double)self->kinematics.values);
+}
+
 /// What the periods of a run have in common is its block, what they do not is noise or an effect that depends on time.
 static bool noise_from_periods(struct evidence *self, const struct sim_model *model, double *raw)
 {
@@ -261,6 +303,7 @@ static bool noise_from_periods(struct evidence *self, const struct sim_model *mo
         scatter_of_periods(self, both, spectra, raw);
         smooth(self, raw);
         factorise(self);
+        self->scatter = whitened_scatter(self, raw);
         good = contrast_take(self, model, spectra, stride) && contrast_find_tones(self, both);
     }
     free(both);

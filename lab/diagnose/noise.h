@@ -21,6 +21,7 @@ struct evidence {
     struct fft_plan *plan;
     double *covariance; ///< per bin 0..band: S_mm, S_aa, Re S_am, Im S_am of the block's DFT divided by its length
     double *factor;     ///< per bin: inverse Cholesky factor, l_mm, l_aa, Re l_am, Im l_am
+    double scatter;     ///< whitened squares of what differs between the periods, all summed; 0 without periods
     size_t allowance_count;
     double *allowances;                         ///< values each: unit vectors of what no cause is, but no noise either
     double allowance_kept[evidence_allowances]; ///< share that is kept of a residual along each, one after the other
@@ -40,6 +41,8 @@ void evidence_free(struct evidence *self);
 /// Estimates the noise under a model: from the scatter of the periods' residuals about their mean, averaged over
 /// neighbouring bins; in a run without periods from the smoothed spectrum of the residual itself, an upper bound.
 /// Equation:  C_k = 1 / (P (P-1)) sum_p (R_p - mean) (R_p - mean)^H, smoothed;  R = DFT / N
+///            The whitening factor is smaller than C_k^-1 by what the few scatters behind an estimate make its inverse
+///            too large.
 /// Errors: false if memory is short.
 bool evidence_estimate_noise(struct evidence *self, const struct sim_model *model);
 

@@ -60,29 +60,56 @@ static double error_at(const struct evidence *e, const struct spectra *s, size_t
     return square(a[0] - m[0], a[1] - m[1]) + square(a[0], a[1]);
 }
 
-/// Mean square of the whitened residuals; of a contrast's deviations from the mean of P periods P - 1 in P are free.
-static double whitened_mean_square(const struct fit_data *data, const struct sim_model *model, bool in_time)
+static double sum_of_squares(size_t n, const double *values)
 {
-    double sum = 0.0, count = (double)data->values;
-    double *residual = malloc((data->values + data->contrasts) * sizeof *residual);
-    if (!residual)
-        return NAN;
-    size_t rows = fit_residual(data, model, residual);
-    for (size_t i = 0; i < (in_time ? rows : data->values); i++)
-        sum += residual[i] * residual[i];
-    free(residual);
-    for (size_t i = 0; in_time && data->contrasts > 0 && i < data->runs; i++) {
-        const struct evidence *e = &data->evidence[i];
-        sum += rows > data->values ? 0.0 : e->contrast.without;
-        count += (double)e->contrast.values * (1.0 - 1.0 / (double)e->recording->periods);
-    }
-    return sum / count;
+    double sum = 0.0;
+    for (size_t i = 0; i < n; i++)
+        sum += values[i] * values[i];
+    return sum;
 }
 
-struct diagnosis_figures validate_figures(const struct fit_data *data, const struct sim_model *model, bool in_time)
+/// Whitened mean squares: of the mean of the periods, and of all periods.
+static bool whitened_mean_squares(const struct fit_data *data, const struct sim_model *model, double *out_of_mean,
+                                  double *out_of_all)
 {
-    struct diagnosis_figures figures = {NAN, NAN};
-    double error = 0.0, torque = 0.0, whitened = whitened_mean_square(data, model, in_time);
+    double *residual = malloc((data->values + data->contrasts) * sizeof *residual), count = 0.0;
+    if (!residual)
+        return false;
+    size_t rows = fit_residual(data, model, residual);
+    double of_mean = sum_of_squares(data->values, residual), differing = 0.0;
+    for (size_t i = 0; i < data->runs; i++) {
+        const struct evidence *e = &data->evidence[i];
+        count += (double)e->recording->periods * (double)e->values;
+        differing += e->scatter;
+        if (data->contrasts > 0)
+            differing += (rows > data->values ? 0.0 : e->contrast.without) - e->contrast.reference;
+    }
+    if (rows > data->values)
+        differing += sum_of_squares(rows - data->values, residual + data->values);
+    free(residual);
+    *out_of_mean = of_mean / (double)data->values;
+    *out_of_all = (of_mean + differing) / count;
+    return true;
+}
+
+double validate_mean_rms_chance(const struct fit_data *data)
+{
+    const double once_in_twenty = 1.645;
+    double variance = 0.0;
+    for (size_t i = 0; i < data->runs; i++) {
+        const struct evidence *e = &data->evidence[i];
+        double periods = (double)e->recording->periods, estimated = periods > 1.0 ? periods / (periods - 1.0) : 1.0;
+        variance += 2.0 * estimated * (double)e->values;
+    }
+    return sqrt(1.0 + once_in_twenty * sqrt(variance) / (double)data->values);
+}
+
+struct diagnosis_figures validate_figures(const struct fit_data *data, const struct sim_model *model)
+{
+    struct diagnosis_figures figures = {NAN, NAN, NAN};
+    double error = 0.0, torque = 0.0, of_mean, of_all;
+    if (!whitened_mean_squares(data, model, &of_mean, &of_all))
+        return figures;
     for (size_t i = 0; i < data->runs; i++) {
         const struct evidence *e = &data->evidence[i];
         struct spectra s;
@@ -97,7 +124,8 @@ struct diagnosis_figures validate_figures(const struct fit_data *data, const str
         free(s.signals);
     }
     figures.validation_nrmse = sqrt(error / torque);
-    figures.whitened_rms = sqrt(whitened);
+    figures.whitened_rms = sqrt(of_all);
+    figures.mean_rms = sqrt(of_mean);
     return figures;
 }
 

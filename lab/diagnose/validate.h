@@ -15,8 +15,15 @@
 ///            for the measured motion is off from the measured torque; the second, there only with a torque reference,
 ///            is
 ///            what the model's actuator is off, which the first cannot see.
-///            whitened_rms^2 = mean of squared whitened residuals, with `in_time` those of the contrasts among them.
-struct diagnosis_figures validate_figures(const struct fit_data *data, const struct sim_model *model, bool in_time);
+///            whitened_rms^2 = (X + S) / (P n),  mean_rms^2 = X / n,  with X the sum of the n squared whitened residuals
+///            of the mean of P periods and S that of what differs between the periods, under the model that the noise
+///            was estimated with, and what effects in time change of it.
+struct diagnosis_figures validate_figures(const struct fit_data *data, const struct sim_model *model);
+
+/// What noise lets mean_rms of a perfect model exceed once in twenty.
+/// Equation:  (1 + 1.645 sqrt(2 P / ((P - 1) n)))^(1/2): n squares of variance 2, and as much again over P - 1 because
+///            the noise was estimated from the scatter of P periods
+double validate_mean_rms_chance(const struct fit_data *data);
 
 /// The same nrmse for a perfect model: from the noise; without periods from the spectrum above the excited band.
 double validate_noise_floor(const struct fit_data *data, const struct sim_model *model);

@@ -116,7 +116,7 @@ void wording_estimate(double value, double deviation, char out_text[2 * wording_
 static bool refit_matters(const struct diagnosis *self)
 {
     const double visibly = 1.1;
-    return self->nominal.whitened_rms > visibly * self->refitted.whitened_rms;
+    return self->nominal.mean_rms > visibly * self->refitted.mean_rms;
 }
 
 void wording_headline(const struct diagnosis *self, char out_text[wording_size])

@@ -389,6 +389,8 @@ static int prepare(struct loop *self, struct error *out_error)
     const struct measure_plan *plan = self->plan;
     struct guard_real_limits limits = plan->limits;
     limits.watchdog_samples = plan->lost_in_a_row_max ? plan->lost_in_a_row_max : default_lost_in_a_row;
+    limits.watchdog_samples =
+        (uint32_t)fmax(limits.watchdog_samples, fmin(ceil(plan->lost_for_s * rate_hz(plan->table)), UINT32_MAX));
     const struct msgen_player_config config = player_config(plan);
     enum core_status status = guard_real_init(&self->guard, &limits);
     if (status == core_ok) {

@@ -36,6 +36,7 @@ struct measure_plan {
     bool without_fade_in;
     uint32_t abort_samples;     ///< length of the ramp down on a stop; 0: measure_ramp_samples
     uint32_t lost_in_a_row_max; ///< more lost samples than this one after the other stop the measurement; 0: 20
+    double lost_for_s; ///< the same as a time, where that is more samples: a bus in real time stumbles now and then
     /// GUARD_REAL_LIMITS_NONE where none are wanted; watchdog_samples is overwritten. Torque and speed limits are set
     /// in the drive too; without a torque limit the drive gets 3 times the table's largest torque.
     struct guard_real_limits limits;

@@ -5,15 +5,6 @@
 
 #include <math.h>
 
-double vector_dot(size_t count, const double *a, const double *b)
-{
-    double sum = 0.0;
-    for (size_t i = 0; i < count; i++) {
-        sum += a[i] * b[i];
-    }
-    return sum;
-}
-
 enum { sums = 8 };
 
 static double sum_of_sums(const double partial[sums])
@@ -23,6 +14,21 @@ static double sum_of_sums(const double partial[sums])
         sum += partial[i];
     }
     return sum;
+}
+
+CLONED_FOR_AVX2 double vector_dot(size_t count, const double *a, const double *b)
+{
+    double partial[sums] = {0.0};
+    size_t n = 0;
+    for (; n + sums <= count; n += sums) {
+        for (size_t i = 0; i < sums; i++) {
+            partial[i] += a[n + i] * b[n + i];
+        }
+    }
+    for (; n < count; n++) {
+        partial[0] += a[n] * b[n];
+    }
+    return sum_of_sums(partial);
 }
 
 CLONED_FOR_AVX2 double vector_sum(size_t count, const double *a)

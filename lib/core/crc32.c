@@ -9,7 +9,7 @@ static const uint32_t nibble_remainders[16] = {
 
 uint32_t core_crc32(uint32_t crc, const void *data, size_t size)
 {
-    const unsigned char *bytes = data;
+    const unsigned char *bytes = (const unsigned char *)data;
     crc = ~crc;
     for (size_t i = 0; i < size; ++i) {
         crc ^= bytes[i];

@@ -5,6 +5,10 @@
 #ifndef SERVOSCOPE_CORE_STATUS_H
 #define SERVOSCOPE_CORE_STATUS_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum core_status {
     core_ok = 0,
     core_err_argument = -1, ///< a null pointer, or a value that only a programming error can produce
@@ -52,5 +56,9 @@ enum core_status {
 
 /// One line for a person, without full stop; never NULL, also for numbers that are not in the list.
 const char *core_status_str(enum core_status status);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

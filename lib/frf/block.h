@@ -22,6 +22,10 @@
 #include "frf/block_table.h"
 #include "frf/dft.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Words of int32_t: accumulators, 2 a bin, channel and bank (bins rounded up to even), per channel the vector that is
 /// worked on, and what projecting takes. Arguments are evaluated more than once.
 #define FRF_BLOCK_STORAGE_WORDS(bins, channels, banks, L, terms)                                                       \
@@ -116,5 +120,9 @@ bool frf_block_is_intact(const struct frf_block *self, const struct frf_block_pe
 /// Sum over the period of y[n] cos and of -y[n] sin at a bin, times 2^(30 + gain_shift of the table).
 void frf_block_sums(const struct frf_block *self, const struct frf_block_period *period, uint32_t bin, uint32_t channel,
                     int64_t *out_real, int64_t *out_imaginary);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

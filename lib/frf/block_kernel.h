@@ -7,6 +7,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Rotates accumulators and adds a block's contribution, two rows at a time:
 ///
 ///     re <- re c - im s + R/16,    R = 8 + sum_i data[2i] a_i / 2
@@ -29,6 +33,10 @@ frf_block_kernel frf_block_accumulate_armv7em;
 #define FRF_BLOCK_ACCUMULATE frf_block_accumulate_armv7em
 #else
 #define FRF_BLOCK_ACCUMULATE frf_block_accumulate_portable
+#endif
+
+#ifdef __cplusplus
+}
 #endif
 
 #endif

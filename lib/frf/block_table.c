@@ -90,25 +90,17 @@ static double project(int32_t *basis, const struct frf_block_table *table, doubl
             product += function[i] * io_line[i];
             norm += function[i] * function[i];
         }
-        out_factors[row] = product / norm + (pass == row ? 0.0 : out_factors[row]);
+        /* A factor is cut to what Q31 holds; what is lost by that stays in the remainder. */
+        double before = pass == row ? 0.0 : out_factors[row], factor = fmax(-1.0, fmin(before + product / norm, 1.0));
+        out_factors[row] = factor;
         for (uint32_t i = 0; i < half; ++i) {
-            io_line[i] -= product / norm * function[i];
+            io_line[i] -= (factor - before) * function[i];
         }
     }
     for (uint32_t i = 0; i < half; ++i) {
         squares += io_line[i] * io_line[i];
     }
     return sqrt(squares / (double)half);
-}
-
-static bool fits_q31(const double *values, uint32_t count)
-{
-    for (uint32_t i = 0; i < count; ++i) {
-        if (!(fabs(values[i]) < 1.0)) {
-            return false;
-        }
-    }
-    return true;
 }
 
 /* One row; false if the basis does not hold the line. */
@@ -123,7 +115,7 @@ static bool build_row(int32_t *rows, int32_t *basis, const struct frf_block_tabl
         const double *values = line;
         sample_line(table, bin, part, line);
         if (basis) {
-            if (!(project(basis, table, line, part, factors) <= basis_error_max) || !fits_q31(factors, terms / 2u)) {
+            if (!(project(basis, table, line, part, factors) <= basis_error_max)) {
                 return false;
             }
             values = factors;

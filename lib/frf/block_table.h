@@ -21,6 +21,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define FRF_BLOCK_SAMPLES_MAX 128u ///< largest L
 
 /// Terms of a line and block: L without a shared basis, else R.
@@ -72,5 +76,9 @@ void frf_block_choose(const uint32_t *bins, uint32_t bin_count, uint32_t period_
 enum core_status frf_block_build(int32_t *storage, uint32_t words, const uint32_t *bins, uint32_t bin_count,
                                  uint32_t period_samples, const struct frf_block_layout *layout,
                                  struct frf_block_table *out_table);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -103,7 +103,7 @@ static void latch(struct frf_dft *self)
 
 void frf_dft_feed(struct frf_dft *self, const void *frames, uint32_t frame_bytes, uint32_t count)
 {
-    const unsigned char *next = frames;
+    const unsigned char *next = (const unsigned char *)frames;
     while (count > 0) {
         uint32_t room = self->period_samples - self->position;
         uint32_t piece = count < room ? count : room;

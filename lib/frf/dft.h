@@ -29,6 +29,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Why a period does not count; bits, several may hold. 0 is a valid period.
 enum frf_reason {
     frf_reason_gap = 1,         ///< samples were lost
@@ -149,5 +153,9 @@ bool frf_dft_is_intact(const struct frf_dft *self, const struct frf_period *peri
 int64_t frf_period_real(const struct frf_dft *self, const struct frf_period *period, uint32_t bin, uint32_t channel);
 int64_t frf_period_imaginary(const struct frf_dft *self, const struct frf_period *period, uint32_t bin,
                              uint32_t channel);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

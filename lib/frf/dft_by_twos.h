@@ -9,6 +9,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Where in the table a bin is, how far it goes a sample, N, and samples per frame.
 struct frf_walk {
     uint32_t index, step, period, stride;
@@ -23,6 +27,10 @@ frf_sum_by_twos frf_sum_by_twos_armv6m;
 #define FRF_SUM_BY_TWOS frf_sum_by_twos_armv6m
 #else
 #define FRF_SUM_BY_TWOS frf_sum_by_twos_portable
+#endif
+
+#ifdef __cplusplus
+}
 #endif
 
 #endif

@@ -28,7 +28,7 @@ static void add(struct frf_dft *self, const void *frames, uint32_t count, bool f
 {
     const struct frf_twiddles_f32 twiddles = self->twiddles.f32;
     for (uint32_t b = 0; b < self->bin_count; ++b) {
-        const float *samples = frames;
+        const float *samples = (const float *)frames;
         union frf_word *bin = &self->bins[b / 2u];
         union frf_word *total = frf_active_bank(self) + b * self->channels;
         union frf_word *partial = self->partial + b * self->channels;
@@ -63,7 +63,7 @@ static bool frame_is_finite(const float *frame, uint32_t channels)
 
 void frf_dft_add_f32(struct frf_dft *self, const float *frames, uint32_t count)
 {
-    static const float zeros[SERVOSCOPE_FRF_CHANNELS_MAX];
+    static const float zeros[SERVOSCOPE_FRF_CHANNELS_MAX] = {0.0f};
     uint32_t frame_bytes = self->channels * (uint32_t)sizeof *frames;
     if (self->number != frf_number_f32) {
         self->err.wrong_type = core_count_up(self->err.wrong_type);

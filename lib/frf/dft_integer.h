@@ -34,7 +34,7 @@ static inline uint32_t add_bin(union frf_word *sums, FRF_TWIDDLES twiddles, uint
 
 static void add(struct frf_dft *self, const void *frames, uint32_t count, bool fresh)
 {
-    const int16_t *samples = frames;
+    const int16_t *samples = (const int16_t *)frames;
     union frf_word *bank = frf_active_bank(self);
     for (uint32_t b = 0; b < self->bin_count; ++b) {
         union frf_word *bin = &self->bins[b / 2u];

@@ -9,7 +9,7 @@
 
 /* |sum| <= 2^15 * (2^15 - 1) * N: has to stay below 2^63. */
 CORE_STATIC_ASSERT((uint64_t)SERVOSCOPE_FRF_PERIOD_MAX <= ((uint64_t)1 << 62) >> (15 + 15),
-                   accumulator_cannot_overflow);
+                   q15_accumulator_cannot_overflow);
 
 /* One part of one bin; returns the index after it. */
 static uint32_t add_part(union frf_word *sum, int32_t sign, const int16_t *table, struct frf_walk walk,

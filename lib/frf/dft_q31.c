@@ -8,7 +8,7 @@
 
 /* |sum| <= 2^15 * (2^31 - 1) * N: has to stay below 2^63. */
 CORE_STATIC_ASSERT((uint64_t)SERVOSCOPE_FRF_PERIOD_MAX <= ((uint64_t)1 << 62) >> (15 + 31),
-                   accumulator_cannot_overflow);
+                   q31_accumulator_cannot_overflow);
 
 enum core_status frf_dft_init_q31(struct frf_dft *self, const struct frf_dft_config *config,
                                   const struct frf_twiddles_q31 *twiddles)

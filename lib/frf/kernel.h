@@ -5,6 +5,10 @@
 
 #include "frf/dft.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Whether there are bins, not too many, strictly ascending from 1 and below half the period; else core_err_frf_bins.
 enum core_status frf_check_bins(const uint32_t *bins, uint32_t bin_count, uint32_t period);
 
@@ -35,5 +39,9 @@ static inline uint32_t frf_next_index(uint32_t index, uint32_t step, uint32_t pe
     uint32_t next = index + step;
     return next >= period ? next - period : next;
 }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

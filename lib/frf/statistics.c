@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stddef.h>
 
-static const struct frf_complex complex_zero;
+static const struct frf_complex complex_zero = {0, 0};
 
 static bool is_finite(struct frf_complex value)
 {
@@ -105,8 +105,8 @@ struct frf_complex frf_period_value(const struct frf_dft *dft, const struct frf_
     struct frf_complex value;
     if (dft->number == frf_number_f32) {
         const union frf_word *word = &period->sums[bin * dft->channels + channel];
-        value.real = word->pair[0];
-        value.imaginary = word->pair[1];
+        value.real = (core_real)word->pair[0];
+        value.imaginary = (core_real)word->pair[1];
         return value;
     }
     core_real one = dft->number == frf_number_q15 ? (core_real)FRF_Q15_ONE : (core_real)FRF_Q31_ONE;
@@ -162,7 +162,7 @@ static core_real response_variance(const struct frf_estimate *estimate, core_rea
 void frf_statistics_estimate(const struct frf_statistics *self, uint32_t bin, core_real input_floor,
                              struct frf_estimate *out_estimate)
 {
-    static const struct frf_estimate nothing;
+    static const struct frf_estimate nothing = {0, 0, 0, 0, 0, {0, 0}, frf_valid};
     const struct frf_pair *pair = &self->pairs[bin];
     core_real input_norm = norm(pair->input_mean);
     *out_estimate = nothing;
@@ -186,7 +186,7 @@ void frf_statistics_estimate(const struct frf_statistics *self, uint32_t bin, co
     }
     struct frf_complex response = {out_estimate->real, out_estimate->imaginary};
     struct frf_complex spread = {out_estimate->std, out_estimate->input_variance + out_estimate->output_variance};
-    if (!is_finite(response) || !is_finite(spread) || !is_finite(out_estimate->covariance)) {
+    if (!is_finite(response) || !is_finite(spread)) { /* |s_yu| <= (s_uu + s_yy) / 2 */
         *out_estimate = nothing;
         out_estimate->validity = frf_invalid_not_finite;
     }

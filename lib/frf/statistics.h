@@ -20,6 +20,10 @@
 #include "core/real.h"
 #include "frf/dft.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 struct frf_complex {
     core_real real, imaginary;
 };
@@ -88,5 +92,9 @@ void frf_statistics_estimate(const struct frf_statistics *self, uint32_t bin, co
 /// Fourier coefficient of a latched period in sample counts, whatever the variant; the table's factor is taken out.
 struct frf_complex frf_period_value(const struct frf_dft *dft, const struct frf_period *period, uint32_t bin,
                                     uint32_t channel);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -13,6 +13,10 @@
 
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Words of storage for the table of N samples. N is evaluated more than once.
 #define FRF_TWIDDLE_WORDS(N) ((N) % 4u == 0u ? (N) + (N) / 4u : 2u * (N))
 
@@ -48,5 +52,9 @@ enum core_status frf_twiddles_build_q31(int32_t *storage, uint32_t words, uint32
                                         struct frf_twiddles_q31 *out_twiddles);
 enum core_status frf_twiddles_build_f32(float *storage, uint32_t words, uint32_t period_samples,
                                         struct frf_twiddles_f32 *out_twiddles);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

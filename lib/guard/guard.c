@@ -71,9 +71,9 @@ static int32_t value_of(const struct guard *self, enum guard_cause cause, const 
         return self->state.silent_samples > (uint32_t)INT32_MAX ? INT32_MAX : (int32_t)self->state.silent_samples;
     case guard_cause_sensor:
     case guard_cause_none:
-        break;
+    default:
+        return 0;
     }
-    return 0;
 }
 
 enum guard_action guard_step(struct guard *self, const struct guard_sample *sample)

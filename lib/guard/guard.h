@@ -27,6 +27,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum guard_cause {
     guard_cause_none = 0,
     guard_cause_sensor = 1, ///< the sample said it is invalid, or (SI variant) a value is not a number
@@ -108,5 +112,9 @@ void guard_alive(struct guard_state *state);
 
 /// One word for a person; never NULL.
 const char *guard_cause_str(enum guard_cause cause);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -79,8 +79,6 @@ static core_real sensor_value(const struct guard_real_sample *sample)
 static core_real value_of(const struct guard_real *self, enum guard_cause cause, const struct guard_real_sample *sample)
 {
     switch (cause) {
-    case guard_cause_sensor:
-        return sensor_value(sample);
     case guard_cause_travel:
         return sample->position_rad;
     case guard_cause_speed:
@@ -89,10 +87,11 @@ static core_real value_of(const struct guard_real *self, enum guard_cause cause,
         return sample->torque_Nm;
     case guard_cause_watchdog:
         return (core_real)self->state.silent_samples;
+    case guard_cause_sensor:
     case guard_cause_none:
-        break;
+    default:
+        return sensor_value(sample);
     }
-    return 0;
 }
 
 enum guard_action guard_real_step(struct guard_real *self, const struct guard_real_sample *sample)

@@ -7,6 +7,10 @@
 #include "core/real.h"
 #include "guard/guard.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Limits in SI units (linear axes: m, m/s, N). What is not wanted: -CORE_REAL_MAX and CORE_REAL_MAX, durations 0;
 /// GUARD_REAL_LIMITS_NONE has them all. Even then a value has to be finite.
 struct guard_real_limits {
@@ -41,5 +45,9 @@ enum core_status guard_real_init(struct guard_real *self, const struct guard_rea
 enum core_status guard_real_arm(struct guard_real *self, const struct guard_real_sample *now);
 enum guard_action guard_real_step(struct guard_real *self, const struct guard_real_sample *sample);
 core_real guard_real_clip_torque(struct guard_real *self, core_real torque_Nm);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

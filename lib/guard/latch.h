@@ -5,6 +5,10 @@
 
 #include "guard/guard.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 void guard_state_init(struct guard_state *self, uint32_t watchdog_samples, uint32_t stuck_samples);
 
 /// Arms or refuses; `inside` says whether the axis is inside its limits now.
@@ -16,5 +20,9 @@ enum guard_cause guard_state_watch(struct guard_state *self, enum guard_cause me
 
 /// Latches a cause, if there is one, and says what the player has to do.
 enum guard_action guard_state_latch(struct guard_state *self, enum guard_cause cause);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

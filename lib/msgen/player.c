@@ -264,6 +264,8 @@ struct msgen_player_state msgen_player_advance(struct msgen_player *self)
         fade_out_one(self, self->abort_from_q30);
         break;
     case msgen_phase_done:
+    default: /* damaged memory ends the excitation */
+        self->phase = msgen_phase_done;
         self->factor_q30 = 0;
         return state;
     }

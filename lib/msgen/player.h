@@ -37,6 +37,10 @@
 
 #include "msgen/table.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum { msgen_ramp_samples_max = 1 << 24, msgen_gain_one = 1 << 16 };
 
 enum msgen_phase {
@@ -127,5 +131,9 @@ enum core_status msgen_player_set_up(struct msgen_player *self, const struct msg
 
 /// Moves on by one sample and returns its place and, in self->factor_q30, its fade factor: what both steps share.
 struct msgen_player_state msgen_player_advance(struct msgen_player *self);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

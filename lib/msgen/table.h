@@ -38,6 +38,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum {
     msgen_channels_max = 3,
     msgen_header_bytes = 56,        ///< of version 1
@@ -109,5 +113,9 @@ int32_t msgen_table_count(const struct msgen_table *self, uint32_t n, uint32_t c
 
 /// Bits of a sample, f32 only; n < period_samples, channel < channels. Interrupt-safe.
 uint32_t msgen_table_float_bits(const struct msgen_table *self, uint32_t n, uint32_t channel);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -17,14 +17,15 @@ static void mode_attach(const double *p, struct sim_attached_mass *out_mass)
         .inertia = p[1], .stiffness = p[1] * rate * rate, .damping = 2.0 * p[2] * rate * p[1]};
 }
 
-/// Frequencies from an eighth of the highest line to above it, with a mass that is a small share of the whole.
+/// Frequencies from a sixteenth of the highest line to half above it, each felt as far as the next, with a mass so small
+/// that what it does is proportional to it.
 static bool mode_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
 {
-    const double first = 0.06, growth = 1.25, share = 0.05, damping_ratio = 0.08; // wide enough to be felt between two
+    const double first = 0.06, last = 1.5, growth = 1.08, share = 0.002, damping_ratio = 0.04;
     out[0] = coverage->frequency_max_hz * first * pow(growth, (double)index);
     out[1] = share * (model->motor_inertia_kgm2 + model->load_inertia_kgm2);
     out[2] = damping_ratio;
-    return index < sim_effect_scan_max;
+    return index < sim_effect_scan_max && out[0] < last * coverage->frequency_max_hz;
 }
 
 static bool mode_testable(const double *p, const struct sim_coverage *coverage, char *out_why, size_t size)
@@ -76,6 +77,8 @@ const struct sim_effect sim_effect_second_mode = {
                     .optional = true,
                     .usual = 0.02,
                     .model_offset = SIZE_MAX}},
+    .proportional = true,
+    .size = 1,
     .attach = mode_attach,
     .scan = mode_scan,
     .testable = mode_testable,

@@ -1,363 +1,297 @@
 /* SPDX-License-Identifier: MIT */
 #include "sim/node/simulated_drive.h"
 
+#include "sim/node/simulated_drive_parts.h"
+
 #include <math.h>
 #include <string.h>
 
-static double sample_period_s(const struct simulated_drive *self)
+// ---- Time: its own clock against the bus's
+
+static uint64_t own_time_us(const struct simulated_drive *self, uint64_t bus_us)
 {
-    return 1.0 / self->model.sample_rate_hz;
+    return self->clock_rate == 1.0 ? bus_us : (uint64_t)((double)bus_us * self->clock_rate);
 }
 
-static void detect_fault(struct simulated_drive *self, uint16_t code, uint8_t register_bits)
+/// The first bus time at which its own clock shows at least `own_us`.
+static uint64_t bus_time_us(const struct simulated_drive *self, uint64_t own_us)
 {
-    bool powered = cia402_machine_is_powered(&self->machine);
-    if (self->machine.state == cia402_fault || self->machine.state == cia402_fault_reaction_active)
-        return;
-    self->objects.error_code = code;
-    cia402_machine_event(&self->machine, cia402_fault_detected);
-    self->stopping_samples = 0;
-    if (!powered) // nothing to ramp down
-        cia402_machine_event(&self->machine, cia402_fault_reaction_done);
-    canopen_node_raise(&self->node, code, register_bits);
+    if (self->clock_rate == 1.0 || own_us == CAN_NEVER_US)
+        return own_us;
+    uint64_t bus_us = (uint64_t)((double)own_us / self->clock_rate);
+    while (own_time_us(self, bus_us) < own_us)
+        bus_us++;
+    return bus_us;
 }
 
-// ---- Dictionary
+// ---- Sending
 
-static uint32_t write_control_word(void *owner, const struct od_entry *entry, int64_t value)
+static void flush_replies(struct simulated_drive *self, uint64_t now_us)
 {
-    struct simulated_drive *self = owner;
-    enum cia402_state before = self->machine.state;
-    od_store(owner, entry, value);
-    if (cia402_machine_command(&self->machine, (uint16_t)value)) {
-        self->objects.error_code = 0;
-        canopen_node_clear_errors(&self->node);
+    size_t sent = 0;
+    while (sent < self->reply_count && self->replies[sent].due_us <= now_us) {
+        if (self->port.operations->send(self->port.self, &self->replies[sent].frame) != can_ok)
+            self->node.errors.frames_unsent++;
+        sent++;
     }
-    if (before != cia402_operation_enabled && self->machine.state == cia402_operation_enabled) {
-        self->followed_position = self->objects.position_actual;
-        self->following_samples = 0;
-        if (!self->period_valid) {
-            self->machine.state = cia402_switched_on;
-            detect_fault(self, emcy_parameter, emcy_profile_specific);
-        }
+    self->reply_count -= sent;
+    memmove(self->replies, self->replies + sent, self->reply_count * sizeof self->replies[0]);
+}
+
+/// What the node sends through: TPDOs may have to wait, and nothing goes out of a silent drive.
+static enum can_status send_delayed(void *object, const struct can_frame *frame)
+{
+    struct simulated_drive *self = object;
+    if (self->silent)
+        return can_ok;
+    bool process_data = frame->id >= 0x180 && frame->id < 0x580;
+    if (!process_data || self->reply_us == 0 || self->reply_count == simulated_replies_max)
+        return self->port.operations->send(self->port.self, frame);
+    self->replies[self->reply_count].frame = *frame;
+    self->replies[self->reply_count].due_us = self->node.now_us + self->reply_us;
+    self->reply_count++;
+    return can_ok;
+}
+
+static const struct can_port_operations delayed_operations = {.send = send_delayed};
+
+// ---- Faults
+
+static void begin_fault(struct simulated_drive *self, const struct simulated_fault *fault)
+{
+    static const enum sim_encoder encoders[simulated_fault_kinds] = {
+        [simulated_fault_encoder_stuck] = sim_encoder_stuck,
+        [simulated_fault_encoder_reversed] = sim_encoder_reversed,
+        [simulated_fault_encoder_dead] = sim_encoder_dead,
+    };
+    self->injected[fault->kind]++;
+    switch (fault->kind) {
+    case simulated_fault_heartbeat_stops:
+        self->node.producer.period_us = 0;
+        break;
+    case simulated_fault_reset: {
+        struct can_frame frame = nmt_command_frame(nmt_reset_node, self->node.node_id);
+        canopen_node_receive(&self->node, &frame, self->node.now_us);
+        break;
     }
-    if (before != self->machine.state)
-        self->stopping_samples = 0;
-    return od_abort_none;
-}
-
-static uint32_t write_quick_stop_option(void *owner, const struct od_entry *entry, int64_t value)
-{
-    struct simulated_drive *self = owner;
-    if (value != 2 && value != 6)
-        return od_abort_value;
-    od_store(owner, entry, value);
-    self->machine.stays_in_quick_stop = value == 6;
-    return od_abort_none;
-}
-
-static uint32_t write_mode(void *owner, const struct od_entry *entry, int64_t value)
-{
-    struct simulated_drive *self = owner;
-    if (value != cia402_mode_csp && value != cia402_mode_cst && value != 0)
-        return od_abort_value;
-    if (cia402_machine_is_powered(&self->machine) && value != self->objects.mode)
-        return od_abort_state; // a change under torque would be a step
-    od_store(owner, entry, value);
-    self->objects.mode_display = (int8_t)value;
-    return od_abort_none;
-}
-
-static uint32_t write_max_torque(void *owner, const struct od_entry *entry, int64_t value)
-{
-    struct simulated_drive *self = owner;
-    od_store(owner, entry, value);
-    self->drive.torque_limit = (double)value * self->scaling.torque;
-    return od_abort_none;
-}
-
-static uint32_t write_deceleration(void *owner, const struct od_entry *entry, int64_t value)
-{
-    struct simulated_drive *self = owner;
-    if (value == 0) // would never stop
-        return od_abort_value;
-    od_store(owner, entry, value);
-    self->drive.stop_deceleration = (double)value * 1e-3;
-    return od_abort_none;
-}
-
-/// Takes the period over into the model if the model can run at it.
-static uint32_t write_period(void *owner, const struct od_entry *entry, int64_t value)
-{
-    struct simulated_drive *self = owner;
-    if (cia402_machine_is_powered(&self->machine))
-        return od_abort_state;
-    if (entry->type == od_u8 ? value == 0 : !(value >= -6 && value <= 0))
-        return od_abort_value;
-    od_store(owner, entry, value);
-    const uint32_t shortest_us = 50, longest_us = 100000;
-    uint32_t period_us = cia402_period_us(self->objects.period_units, self->objects.period_exponent);
-    // The two subindices are written one after the other: in between, the period may be one that does not suit.
-    self->period_valid = period_us >= shortest_us && period_us <= longest_us;
-    if (!self->period_valid)
-        return od_abort_none;
-    struct sim_model candidate = self->model;
-    candidate.sample_rate_hz = 1e6 / period_us;
-    char text[160];
-    self->period_valid = sim_model_check(&candidate, text, sizeof text) == NULL;
-    if (self->period_valid)
-        self->model.sample_rate_hz = candidate.sample_rate_hz;
-    return od_abort_none;
-}
-
-#define AT(member) offsetof(struct simulated_drive, member)
-#define CONSTANT(index, sub, type, value)                                                                              \
-    {                                                                                                                  \
-        index, sub, type, od_readable | od_constant, 0, value, NULL                                                    \
+    case simulated_fault_silent:
+        self->silent = true;
+        break;
+    case simulated_fault_sync_missed:
+        break;
+    default:
+        self->drive.encoder = encoders[fault->kind];
+        break;
     }
-#define READ_ONLY(index, sub, type, member)                                                                            \
-    {                                                                                                                  \
-        index, sub, type, od_readable, AT(member), 0, NULL                                                             \
-    }
-#define WRITABLE(index, sub, type, member, write)                                                                      \
-    {                                                                                                                  \
-        index, sub, type, od_readable | od_writable, AT(objects.member), 0, write                                      \
-    }
-#define TARGET(index, type, member, write)                                                                             \
-    {                                                                                                                  \
-        index, 0, type, od_readable | od_writable | od_mappable_receive, AT(objects.member), 0, write                  \
-    }
-#define ACTUAL(index, type, member)                                                                                    \
-    {                                                                                                                  \
-        index, 0, type, od_readable | od_mappable_transmit, AT(objects.member), 0, NULL                                \
-    }
-
-static const struct od_entry profile_entries[] = {
-    CONSTANT(0x2000, 0, od_u8, 5),
-    READ_ONLY(0x2000, 1, od_u32, objects.saturated),
-    READ_ONLY(0x2000, 2, od_u32, node.errors.targets_lost),
-    READ_ONLY(0x2000, 3, od_u32, node.errors.targets_rejected),
-    READ_ONLY(0x2000, 4, od_u32, node.sync.missed),
-    READ_ONLY(0x2000, 5, od_u32, node.errors.values_refused),
-    ACTUAL(cia402_error_code, od_u16, error_code),
-    TARGET(cia402_control_word, od_u16, control_word, write_control_word),
-    ACTUAL(cia402_status_word, od_u16, status_word),
-    WRITABLE(cia402_quick_stop_option, 0, od_i16, quick_stop_option, write_quick_stop_option),
-    TARGET(cia402_modes_of_operation, od_i8, mode, write_mode),
-    ACTUAL(cia402_mode_display, od_i8, mode_display),
-    ACTUAL(cia402_position_actual, od_i32, position_actual),
-    WRITABLE(cia402_following_error_window, 0, od_u32, following_error_window, NULL),
-    WRITABLE(cia402_following_error_timeout, 0, od_u16, following_error_timeout_ms, NULL),
-    ACTUAL(cia402_velocity_actual, od_i32, velocity_actual),
-    TARGET(cia402_target_torque, od_i16, target_torque, NULL),
-    WRITABLE(cia402_max_torque, 0, od_u16, max_torque, write_max_torque),
-    ACTUAL(cia402_torque_demand, od_i16, torque_demand),
-    READ_ONLY(cia402_rated_torque, 0, od_u32, objects.rated_torque),
-    ACTUAL(cia402_torque_actual, od_i16, torque_actual),
-    TARGET(cia402_target_position, od_i32, target_position, NULL),
-    WRITABLE(cia402_max_velocity, 0, od_u32, max_velocity, NULL),
-    WRITABLE(cia402_quick_stop_deceleration, 0, od_u32, quick_stop_deceleration, write_deceleration),
-    CONSTANT(cia402_encoder_resolution, 0, od_u8, 2),
-    READ_ONLY(cia402_encoder_resolution, 1, od_u32, objects.increments),
-    READ_ONLY(cia402_encoder_resolution, 2, od_u32, objects.revolutions),
-    READ_ONLY(cia402_unit_position, 0, od_u32, objects.unit_position),
-    READ_ONLY(cia402_unit_velocity, 0, od_u32, objects.unit_velocity),
-    READ_ONLY(cia402_unit_acceleration, 0, od_u32, objects.unit_acceleration),
-    TARGET(cia402_velocity_offset, od_i32, velocity_offset, NULL),
-    TARGET(cia402_torque_offset, od_i16, torque_offset, NULL),
-    CONSTANT(cia402_interpolation_period, 0, od_u8, 2),
-    WRITABLE(cia402_interpolation_period, 1, od_u8, period_units, write_period),
-    WRITABLE(cia402_interpolation_period, 2, od_i8, period_exponent, write_period),
-    ACTUAL(cia402_following_error_actual, od_i32, following_error_actual),
-    READ_ONLY(cia402_supported_modes, 0, od_u32, objects.supported_modes),
-};
-
-// ---- Stops and limits
-
-/// A stop is over when its ramp has reached zero and the motor follows, or a tenth of a second after the ramp at the
-/// latest.
-static void finish_stop(struct simulated_drive *self)
-{
-    bool stopping =
-        self->machine.state == cia402_quick_stop_active || self->machine.state == cia402_fault_reaction_active;
-    if (!stopping || self->drive.stop_velocity != 0.0)
-        return;
-    self->stopping_samples++;
-    const double still = self->model.linear ? 3e-4 : 2e-2, longest_s = 0.1;
-    if (!(fabs(self->sample.velocity) <= still) && self->stopping_samples * sample_period_s(self) < longest_s)
-        return;
-    if (self->machine.state == cia402_fault_reaction_active)
-        cia402_machine_event(&self->machine, cia402_fault_reaction_done);
-    else if (!self->machine.stays_in_quick_stop)
-        cia402_machine_event(&self->machine, cia402_quick_stop_done);
 }
 
-static void watch_following_error(struct simulated_drive *self)
+static void end_fault(struct simulated_drive *self, const struct simulated_fault *fault)
 {
-    struct simulated_drive_objects *o = &self->objects;
-    bool following = self->command.control == sim_control_cascade;
-    int64_t error = following ? (int64_t)self->followed_position - o->position_actual : 0;
-    o->following_error_actual = (int32_t)fmin(fmax((double)error, INT32_MIN), INT32_MAX);
-    bool watched = o->following_error_window != 0 && o->following_error_window != UINT32_MAX;
-    if (!watched || (error < 0 ? -error : error) <= (int64_t)o->following_error_window) {
-        self->following_samples = 0;
-        return;
+    if (fault->kind == simulated_fault_silent)
+        self->silent = false;
+    if (fault->kind <= simulated_fault_encoder_dead)
+        self->drive.encoder = sim_encoder_good;
+}
+
+/// A SYNC has come in operation enabled; false if it is lost on this drive.
+static bool pass_faults(struct simulated_drive *self)
+{
+    bool heard = true;
+    self->operating_syncs++;
+    for (size_t i = 0; i < self->fault_count; i++) {
+        const struct simulated_fault *fault = &self->faults[i];
+        uint64_t end = (uint64_t)fault->sync + fault->count;
+        if (self->operating_syncs == fault->sync)
+            begin_fault(self, fault);
+        else if (fault->count != 0 && self->operating_syncs == end)
+            end_fault(self, fault);
+        bool on = self->operating_syncs >= fault->sync && (fault->count == 0 || self->operating_syncs < end);
+        heard = heard && !(on && fault->kind == simulated_fault_sync_missed);
     }
-    self->following_samples++;
-    if (self->following_samples * sample_period_s(self) * 1e3 > o->following_error_timeout_ms)
-        detect_fault(self, emcy_following_error, emcy_profile_specific);
-}
-
-// ---- One sample
-
-/// The position set-point, moved no faster than 607F allows.
-static int32_t limited_position(struct simulated_drive *self)
-{
-    int64_t target = self->objects.target_position;
-    if (self->objects.max_velocity == 0)
-        return (int32_t)target;
-    double limit = self->objects.max_velocity * self->scaling.velocity * sample_period_s(self) / self->scaling.position;
-    int64_t step = (int64_t)fmin(limit, 4e9) + 1; // one count more: the set-points themselves are rounded
-    int64_t from = self->followed_position;
-    if (target > from + step || target < from - step) {
-        self->limited = true;
-        target = target > from ? from + step : from - step;
-    }
-    return (int32_t)target; // between two 32-bit numbers
-}
-
-static int32_t limited_velocity(struct simulated_drive *self)
-{
-    int64_t limit = self->objects.max_velocity, velocity = self->objects.velocity_offset;
-    if (limit == 0 || (velocity <= limit && velocity >= -limit))
-        return (int32_t)velocity;
-    self->limited = true;
-    return (int32_t)(velocity > 0 ? limit : -limit);
-}
-
-static struct sim_command command_of_state(struct simulated_drive *self)
-{
-    const struct simulated_drive_objects *o = &self->objects;
-    const struct cia402_scaling *s = &self->scaling;
-    struct sim_command command = {.control = sim_control_off};
-    self->limited = false;
-    if (!cia402_machine_is_powered(&self->machine))
-        return command;
-    if (self->machine.state != cia402_operation_enabled || (o->control_word & cia402_control_halt) || o->mode == 0) {
-        command.control = sim_control_stop;
-    } else if (o->mode == cia402_mode_cst) {
-        command.control = sim_control_torque;
-        command.torque = ((int32_t)o->target_torque + o->torque_offset) * s->torque;
-    } else {
-        self->followed_position = limited_position(self);
-        command.control = sim_control_cascade;
-        command.position = self->followed_position * s->position;
-        command.velocity = limited_velocity(self) * s->velocity;
-        command.torque = o->torque_offset * s->torque;
-    }
-    return command;
-}
-
-static void publish(struct simulated_drive *self, bool targets_fresh)
-{
-    struct simulated_drive_objects *o = &self->objects;
-    const struct cia402_scaling *s = &self->scaling;
-    uint32_t *saturated = &o->saturated;
-    o->position_actual = cia402_to_units(self->sample.position, s->position, INT32_MIN, INT32_MAX, saturated);
-    o->velocity_actual = cia402_to_units(self->sample.velocity, s->velocity, INT32_MIN, INT32_MAX, saturated);
-    o->torque_actual = (int16_t)cia402_to_units(self->sample.torque, s->torque, INT16_MIN, INT16_MAX, saturated);
-    o->torque_demand = (int16_t)cia402_to_units(self->sample.torque_ref, s->torque, INT16_MIN, INT16_MAX, saturated);
-    watch_following_error(self);
-    finish_stop(self);
-    bool clipped = self->limited || fabs(self->sample.torque_ref) >= self->drive.torque_limit;
-    o->status_word =
-        (uint16_t)(cia402_status_encode(self->machine.state) | cia402_status_remote | cia402_status_voltage);
-    if (clipped && self->command.control != sim_control_off)
-        o->status_word |= cia402_status_limited;
-    bool follows = self->command.control == sim_control_cascade || self->command.control == sim_control_torque;
-    if (follows && targets_fresh)
-        o->status_word |= cia402_status_follows;
-    if (o->error_code == emcy_following_error)
-        o->status_word |= cia402_status_following_error;
-}
-
-static void take_sample(struct simulated_drive *self, bool targets_fresh)
-{
-    self->command = command_of_state(self);
-    sim_belt_drive_step(&self->drive, &self->command, &self->sample);
-    self->samples++;
-    publish(self, targets_fresh);
-    if (self->command.control == sim_control_off) // the torque is off since this sample: nothing left to do alone
-        self->own_cycle = false;
+    return heard;
 }
 
 // ---- What the bus brings
 
+/// Compares the SYNCs' mean period with 60C2: set-points at another rate than the drive believes would be wrong ones.
+static void watch_period(struct simulated_drive *self, uint64_t now_us)
+{
+    enum { window = 16 };
+    uint32_t missed = self->node.sync.missed - self->period.missed;
+    self->period.missed = self->node.sync.missed;
+    if (self->period.periods == 0 || now_us < self->period.since_us) {
+        self->period.since_us = now_us;
+        self->period.periods = 1;
+        return;
+    }
+    self->period.periods += missed;
+    if (self->period.periods < window) {
+        self->period.periods++;
+        return;
+    }
+    double mean_us = (double)(now_us - self->period.since_us) / self->period.periods;
+    double nominal_us = simulated_drive_period_us(self);
+    self->period.wrong = !(fabs(mean_us - nominal_us) <= self->period_tolerance * nominal_us);
+    self->period.since_us = now_us;
+    self->period.periods = 1;
+    if (self->period.wrong && self->machine.state == cia402_operation_enabled)
+        simulated_drive_detect(self, emcy_parameter, emcy_profile_specific, simulated_reaction_by_option);
+}
+
 static void on_synchronise(void *owner, uint64_t now_us, bool targets_fresh)
 {
-    (void)now_us;
     struct simulated_drive *self = owner;
     self->own_cycle = false;
-    take_sample(self, targets_fresh);
+    watch_period(self, now_us);
+    simulated_drive_take_sample(self, targets_fresh);
+    self->next_us = now_us + 2u * simulated_drive_period_us(self);
+}
+
+/// Under torque, until its last sample was one without, and while it turns, a drive goes on whatever the bus does.
+static bool has_to_go_on(const struct simulated_drive *self)
+{
+    return cia402_machine_is_powered(&self->machine) || self->command.control != sim_control_off ||
+           simulated_drive_is_moving(self);
+}
+
+/// A SYNC that is missed by its time-out starts the own cycle; where none is watched, two periods without one do.
+static bool runs_alone(const struct simulated_drive *self)
+{
+    bool watched = self->node.sync.period_us != 0 && self->node.sync.running;
+    return self->own_cycle || (!watched && self->period_valid && has_to_go_on(self));
 }
 
 static void on_connection_lost(void *owner, uint16_t emcy_code, uint64_t now_us)
 {
     struct simulated_drive *self = owner;
-    if (!cia402_machine_is_powered(&self->machine))
-        return;
-    detect_fault(self, emcy_code, emcy_communication_error);
+    struct cia402_machine *machine = &self->machine;
+    self->period.periods = 0;
+    if (!cia402_machine_is_powered(machine))
+        return; // what still turns goes on by itself
+    switch (machine->options.abort_connection) {
+    case 0:
+        canopen_node_raise(&self->node, emcy_code, emcy_communication_error);
+        break;
+    case 1:
+        simulated_drive_detect(self, emcy_code, emcy_communication_error, simulated_reaction_by_option);
+        break;
+    default:
+        canopen_node_raise(&self->node, emcy_code, emcy_communication_error);
+        cia402_machine_command(machine, machine->options.abort_connection == 2 ? cia402_control_disable_voltage
+                                                                               : cia402_control_quick_stop);
+        simulated_drive_update_status(self);
+        break;
+    }
     if (emcy_code == emcy_heartbeat) // SYNC still comes, or will be missed in its own time
         return;
     self->own_cycle = true;
     self->next_us = now_us;
 }
 
-static void power_on(struct simulated_drive *self)
-{
-    struct simulated_drive_objects *o = &self->objects;
-    cia402_machine_init(&self->machine);
-    cia402_machine_event(&self->machine, cia402_initialised);
-    o->quick_stop_option = 2;
-    o->mode = o->mode_display = 0;
-    o->error_code = o->control_word = 0;
-    o->target_position = o->velocity_offset = 0;
-    o->target_torque = o->torque_offset = 0;
-    o->following_error_window = UINT32_MAX;
-    o->following_error_timeout_ms = 0;
-    o->max_velocity = 0;
-    o->max_torque = UINT16_MAX;
-    o->quick_stop_deceleration = self->model.linear ? 5000 : 50000;
-    self->drive.torque_limit = o->max_torque * self->scaling.torque;
-    self->drive.stop_deceleration = o->quick_stop_deceleration * 1e-3;
-    self->own_cycle = false;
-    o->status_word =
-        (uint16_t)(cia402_status_encode(self->machine.state) | cia402_status_remote | cia402_status_voltage);
-}
-
 static void on_reset(void *owner)
 {
-    power_on(owner);
+    struct simulated_drive *self = owner;
+    simulated_drive_set_defaults(self);
 }
 
 static const struct canopen_node_events events = {on_synchronise, on_connection_lost, on_reset};
 
-static void receive(void *object, const struct can_frame *frame, uint64_t now_us)
+// ---- One commander
+
+static bool is_streamed(const struct simulated_drive *self, uint16_t index)
 {
-    struct simulated_drive *self = object;
-    canopen_node_receive(&self->node, frame, now_us);
+    for (size_t i = 0; i < pdo_per_direction; i++) {
+        const struct pdo *pdo = &self->node.rpdo[i];
+        for (size_t e = 0; pdo_is_enabled(pdo) && e < pdo->mapped_count; e++)
+            if (pdo->mapped[e] >> 16 == index)
+                return true;
+    }
+    return false;
 }
 
-static void advance(void *object, uint64_t now_us)
+/// SDO does not say who asks. While somebody streams control words to a drive under torque, a download can only be
+/// somebody else's: then all that it may do is stop.
+static bool refuse_second_commander(struct simulated_drive *self, const struct can_frame *frame)
+{
+    if (frame->id != 0x600u + self->node.node_id || frame->remote || frame->length < 8)
+        return false;
+    unsigned specifier = frame->data[0] >> 5;
+    bool download = specifier == 1 || specifier == 6;
+    if (!download || !cia402_machine_is_powered(&self->machine) || !is_streamed(self, cia402_control_word))
+        return false;
+    bool is_control_word = can_get(&frame->data[1], 2) == cia402_control_word && frame->data[3] == 0;
+    bool expedited = specifier == 1 && (frame->data[0] & 0x02) != 0;
+    if (is_control_word && expedited) {
+        enum cia402_event event = cia402_control_decode((uint16_t)can_get(&frame->data[4], 2));
+        if (event == cia402_quick_stop || event == cia402_disable_voltage)
+            return false;
+    }
+    struct can_frame answer = can_frame_make((uint16_t)(0x580 + self->node.node_id), 8);
+    answer.data[0] = 0x80;
+    memcpy(&answer.data[1], &frame->data[1], 3);
+    can_put(&answer.data[4], 4, od_abort_state);
+    self->commands_refused++;
+    if (send_delayed(self, &answer) != can_ok)
+        self->node.errors.frames_unsent++;
+    return true;
+}
+
+// ---- Participant
+
+static bool is_sync(const struct can_frame *frame)
+{
+    return frame->id == sync_cob_id && !frame->remote;
+}
+
+static void take_sync(struct simulated_drive *self, const struct can_frame *frame, uint64_t own_us)
+{
+    self->holding = false;
+    self->node.now_us = own_us;
+    if (self->machine.state == cia402_operation_enabled && !pass_faults(self))
+        return;
+    canopen_node_receive(&self->node, frame, own_us);
+}
+
+static void receive(void *object, const struct can_frame *frame, uint64_t bus_us)
 {
     struct simulated_drive *self = object;
-    if (self->node.state == nmt_initialising)
-        canopen_node_boot(&self->node, now_us);
-    canopen_node_advance(&self->node, now_us);
-    if (!self->own_cycle || now_us < self->next_us)
+    uint64_t own_us = own_time_us(self, bus_us);
+    if (is_sync(frame)) {
+        if (self->holding)
+            take_sync(self, &self->held, own_us);
+        if (self->latch_us == 0) {
+            take_sync(self, frame, own_us);
+            return;
+        }
+        self->held = *frame;
+        self->holding = true;
+        self->held_due_us = own_us + self->latch_us;
         return;
-    self->next_us += cia402_period_us(self->objects.period_units, self->objects.period_exponent);
-    take_sample(self, false);
+    }
+    if (!refuse_second_commander(self, frame))
+        canopen_node_receive(&self->node, frame, own_us);
+}
+
+static void advance(void *object, uint64_t bus_us)
+{
+    struct simulated_drive *self = object;
+    uint64_t own_us = own_time_us(self, bus_us);
+    if (self->node.state == nmt_initialising)
+        canopen_node_boot(&self->node, own_us);
+    if (self->holding && own_us >= self->held_due_us)
+        take_sync(self, &self->held, own_us);
+    flush_replies(self, own_us);
+    canopen_node_advance(&self->node, own_us);
+    if (!runs_alone(self) || own_us < self->next_us)
+        return;
+    self->own_cycle = true;
+    self->next_us += simulated_drive_period_us(self);
+    simulated_drive_take_sample(self, false);
+}
+
+static uint64_t earlier(uint64_t a, uint64_t b)
+{
+    return a < b ? a : b;
 }
 
 static uint64_t deadline_us(const void *object)
@@ -365,8 +299,14 @@ static uint64_t deadline_us(const void *object)
     const struct simulated_drive *self = object;
     if (self->node.state == nmt_initialising)
         return 0;
-    uint64_t deadline = canopen_node_deadline_us(&self->node);
-    return self->own_cycle && self->next_us < deadline ? self->next_us : deadline;
+    uint64_t own_us = canopen_node_deadline_us(&self->node);
+    if (self->holding)
+        own_us = earlier(own_us, self->held_due_us);
+    if (self->reply_count > 0)
+        own_us = earlier(own_us, self->replies[0].due_us);
+    if (runs_alone(self))
+        own_us = earlier(own_us, self->next_us);
+    return bus_time_us(self, own_us);
 }
 
 struct can_participant simulated_drive_participant(struct simulated_drive *self)
@@ -409,8 +349,8 @@ static void choose_units(struct simulated_drive *self)
     }
     const uint8_t square_second = 0x57;
     o->unit_acceleration = CIA402_UNIT(-3, m->linear ? cia402_unit_metre : cia402_unit_radian, square_second);
-    const struct cia402_scaling_objects scaling = {o->increments, o->revolutions, o->unit_position, o->unit_velocity,
-                                                   o->rated_torque};
+    const struct cia402_scaling_objects scaling = {o->increments,    o->revolutions,  o->unit_position,
+                                                   o->unit_velocity, o->rated_torque, 1000};
     cia402_scaling_read(&scaling, &self->scaling);
 }
 
@@ -419,14 +359,36 @@ void simulated_drive_init(struct simulated_drive *self, const struct sim_model *
 {
     memset(self, 0, sizeof *self);
     self->model = *model;
+    self->port = *port;
+    self->clock_rate = 1.0;
+    self->period_tolerance = 0.25;
+    const struct can_port delayed = {.operations = &delayed_operations, .self = self};
     const struct canopen_node_identity identity = {.device_type = CIA402_SERVO_DRIVE, .product = 0x402, .revision = 1};
-    canopen_node_init(&self->node, node_id, port, &identity, profile_entries,
-                      sizeof profile_entries / sizeof profile_entries[0], &events, self);
+    canopen_node_init(&self->node, node_id, &delayed, &identity, simulated_drive_entries, simulated_drive_entry_count,
+                      &events, self);
     choose_units(self);
-    self->objects.supported_modes = CIA402_SUPPORTS(cia402_mode_csp) | CIA402_SUPPORTS(cia402_mode_cst);
+    self->objects.supported_modes = CIA402_SUPPORTS(cia402_mode_profile_torque) | CIA402_SUPPORTS(cia402_mode_csp) |
+                                    CIA402_SUPPORTS(cia402_mode_csv) | CIA402_SUPPORTS(cia402_mode_cst);
     // A rate that 60C2 cannot say leaves the period at 0 x 1 s: the drive runs once a master has set one.
     self->period_valid =
         cia402_period_encode(1.0 / model->sample_rate_hz, &self->objects.period_units, &self->objects.period_exponent);
     sim_belt_drive_init(&self->drive, &self->model, 0.0);
-    power_on(self);
+    simulated_drive_set_defaults(self);
+}
+
+void simulated_drive_set_faults(struct simulated_drive *self, const struct simulated_fault *faults, size_t count)
+{
+    self->faults = faults;
+    self->fault_count = count;
+}
+
+void simulated_drive_set_delays(struct simulated_drive *self, uint32_t latch_us, uint32_t reply_us)
+{
+    self->latch_us = latch_us;
+    self->reply_us = reply_us;
+}
+
+void simulated_drive_set_drift(struct simulated_drive *self, double drift_ppm)
+{
+    self->clock_rate = 1.0 + drift_ppm * 1e-6;
 }

@@ -237,6 +237,8 @@ static void test_can_faults_delay_is_late_or_harmless(void)
 {
     for (uint32_t delay_us = 300; delay_us <= 6000; delay_us += 200)
         for (uint32_t nth = 1; nth <= clean_frames; nth++) {
+            if (nth <= clean_first && delay_us % 2000 != 300)
+                continue; // setting up does not hang on fractions of a period
             struct outcome out = case_replay(inproc_delay, nth, delay_us, 0, 0, 0);
             injected_once(inproc_delay);
             costs(&out, nth, 0, 2);

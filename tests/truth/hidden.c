@@ -227,8 +227,9 @@ static void print_case(const struct hidden_record *record, int index)
         printf(" (%s)", score->verdict);
     }
     if (score->outcome != score_failed) {
-        printf("  nrmse %.4f > %.4f > %.4f floor %.4f  whitened %.2f", score->nominal_nrmse, score->refitted_nrmse,
-               score->extended_nrmse, score->floor_nrmse, score->whitened_rms);
+        printf("  nrmse %.4f > %.4f > %.4f floor %.4f  whitened %.3f mean %.3f of %.3f", score->nominal_nrmse,
+               score->refitted_nrmse, score->extended_nrmse, score->floor_nrmse, score->whitened_rms, score->mean_rms,
+               score->mean_rms_chance);
     }
     if (score->parameters) {
         printf("  %.1f std", score->worst_z);

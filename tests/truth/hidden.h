@@ -22,6 +22,7 @@ enum hidden_rate {
     hidden_rate_unknown_named,
     hidden_rate_parameters,
     hidden_rate_white,
+    hidden_rate_white_mean,
     hidden_rate_failed,
     hidden_rate_count
 };

@@ -22,6 +22,7 @@ static const struct {
     [hidden_rate_unknown_named] = {"unknown-named", "unknown effect given a wrong name", 0.05, 0},
     [hidden_rate_parameters] = {"parameters", "parameters within 3 standard deviations", 0.95, 1},
     [hidden_rate_white] = {"white", "explained, whitened rms up to 1.02", 0.95, 1},
+    [hidden_rate_white_mean] = {"white-mean", "explained, whitened mean within its 95 %", 0.90, 1},
     [hidden_rate_failed] = {"failed", "no diagnosis", 0.0, 0},
 };
 
@@ -61,6 +62,7 @@ static void count_known(const struct hidden_record *record, int right, struct sh
     out[hidden_rate_parameters].whole += score->parameters;
     if (strcmp(score->verdict, "explained") == 0) {
         add(&out[hidden_rate_white], score->whitened_rms <= 1.02);
+        add(&out[hidden_rate_white_mean], score->mean_rms <= score->mean_rms_chance);
     }
 }
 

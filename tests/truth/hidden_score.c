@@ -23,7 +23,7 @@ void score_fail(struct score *self, const char *why)
 {
     *self = (struct score){.outcome = score_failed, .seconds = self->seconds};
     self->worst_z = self->left_nats = self->nominal_nrmse = self->refitted_nrmse = NAN;
-    self->extended_nrmse = self->floor_nrmse = self->whitened_rms = NAN;
+    self->extended_nrmse = self->floor_nrmse = self->whitened_rms = self->mean_rms = self->mean_rms_chance = NAN;
     snprintf(self->named, sizeof self->named, "%s", why);
 }
 
@@ -233,6 +233,8 @@ void score_read(struct score *self, const struct truth_case *truth, const char *
     self->refitted_nrmse = number_at(cJSON_GetObjectItemCaseSensitive(diagnosis, "refitted"), "validation_nrmse");
     self->extended_nrmse = number_at(extended, "validation_nrmse");
     self->whitened_rms = number_at(extended, "whitened_rms");
+    self->mean_rms = number_at(extended, "mean_rms");
+    self->mean_rms_chance = number_at(diagnosis, "mean_rms_chance");
     self->floor_nrmse = number_at(diagnosis, "noise_floor_nrmse");
     self->outcome = judge(self, truth, diagnosis);
     cJSON_Delete(diagnosis);

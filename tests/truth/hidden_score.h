@@ -28,6 +28,7 @@ struct score {
     char worst_parameter[SCORE_TEXT_LENGTH];
     double left_nats; ///< expected evidence of the truth over the named causes, where they are not the truth
     double nominal_nrmse, refitted_nrmse, extended_nrmse, floor_nrmse, whitened_rms;
+    double mean_rms, mean_rms_chance; ///< of the mean of the periods, and what chance exceeds once in twenty
     double seconds;
 };
 

@@ -149,7 +149,7 @@ static void test_pdo_mapping_refuses_what_cannot_be_mapped(void)
     TEST_ASSERT_EQUAL_HEX32(od_abort_no_object, sdo_write(0x1A00, 0, 1, 4)); // the fourth is not set
     ok(0x1A00, 0, 1, 2);
     TEST_ASSERT_EQUAL_HEX32(od_abort_value, sdo_write(0x1800, 1, 4, 0x20000185)); // 29 bits
-    TEST_ASSERT_EQUAL_HEX32(od_abort_value, sdo_write(0x1800, 2, 1, 255));        // not offered
+    TEST_ASSERT_EQUAL_HEX32(od_abort_value, sdo_write(0x1800, 2, 1, 253));        // on request: not offered
     TEST_ASSERT_EQUAL_HEX32(od_abort_value, sdo_write(0x1800, 2, 1, 0));
     TEST_ASSERT_EQUAL_HEX32(od_abort_value, sdo_write(0x1400, 2, 1, 241));
 }

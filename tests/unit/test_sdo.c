@@ -71,18 +71,24 @@ static uint32_t aborts_with(const struct can_frame *answer)
     return answer->data[0] == 0x80 ? can_get(&answer->data[4], 4) : od_abort_none;
 }
 
-/// What the server has to answer to a command byte for 2000:1 (one byte, read and write).
+/// What the idle server has to answer to a command byte for 2000:1 (one byte, read and write) with 2A in byte 4, where
+/// long transfers have their size.
 static uint32_t expected_abort(uint8_t command)
 {
+    bool one_byte = (command & 3) != 3 || ((command >> 2) & 3) == 3;
     switch (command >> 5) {
     case 1: // download
         if (!(command & 2))
-            return od_abort_command;
-        if ((command & 1) && ((command >> 2) & 3) != 3)
-            return od_abort_too_long;
-        return od_abort_none;
+            return (command & 1) ? od_abort_too_long : od_abort_none;
+        return one_byte ? od_abort_none : od_abort_too_long;
     case 2: // upload
         return od_abort_none;
+    case 5: // block upload
+        return (command & 3) == 0 ? od_abort_none : od_abort_command;
+    case 6: // block download
+        if (command & 1)
+            return od_abort_command;
+        return (command & 2) ? od_abort_too_long : od_abort_none;
     default:
         return od_abort_command;
     }
@@ -92,13 +98,14 @@ static void test_sdo_server_answers_every_command_byte(void)
 {
     for (unsigned command = 0; command < 256; command++) {
         struct can_frame frame = request((uint8_t)command, 0x2000, 1, 0x2A), answer;
+        setUp();
         values.u8 = 0x11;
-        bool answered = sdo_server_take(&server, &frame, &answer);
+        bool answered = sdo_server_take(&server, &frame, 0, &answer);
         char text[32];
         snprintf(text, sizeof text, "command 0x%02X", command);
         TEST_ASSERT_EQUAL_MESSAGE(command >> 5 != 4, answered, text);
         uint32_t expected = expected_abort((uint8_t)command);
-        bool writes = command >> 5 == 1 && expected == od_abort_none;
+        bool writes = command >> 5 == 1 && (command & 2) && expected == od_abort_none;
         TEST_ASSERT_EQUAL_HEX8_MESSAGE(writes ? 0x2A : 0x11, values.u8, text);
         if (!answered)
             continue;
@@ -117,13 +124,13 @@ static void test_sdo_server_ignores_and_counts_every_other_length(void)
         for (uint8_t length = 0; length < 8; length++) {
             struct can_frame frame = request((uint8_t)command, 0x2000, 1, 0x2A), answer;
             frame.length = length;
-            TEST_ASSERT_FALSE(sdo_server_take(&server, &frame, &answer));
+            TEST_ASSERT_FALSE(sdo_server_take(&server, &frame, 0, &answer));
             TEST_ASSERT_EQUAL_UINT32(++counted, server.malformed);
             TEST_ASSERT_EQUAL_HEX8(0, values.u8);
         }
     struct can_frame remote = request(0x40, 0x2000, 1, 0), answer;
     remote.remote = true;
-    TEST_ASSERT_FALSE(sdo_server_take(&server, &remote, &answer));
+    TEST_ASSERT_FALSE(sdo_server_take(&server, &remote, 0, &answer));
 }
 
 static void test_sdo_server_listens_to_its_own_identifier_only(void)
@@ -131,14 +138,14 @@ static void test_sdo_server_listens_to_its_own_identifier_only(void)
     for (uint16_t id = 0; id <= can_id_max; id++) {
         struct can_frame frame = request(0x40, 0x2000, 1, 0), answer;
         frame.id = id;
-        TEST_ASSERT_EQUAL(id == 0x605, sdo_server_take(&server, &frame, &answer));
+        TEST_ASSERT_EQUAL(id == 0x605, sdo_server_take(&server, &frame, 0, &answer));
     }
 }
 
 static uint32_t answer_to(uint8_t command, uint16_t index, uint8_t subindex, uint32_t data)
 {
     struct can_frame frame = request(command, index, subindex, data), answer;
-    TEST_ASSERT_TRUE(sdo_server_take(&server, &frame, &answer));
+    TEST_ASSERT_TRUE(sdo_server_take(&server, &frame, 0, &answer));
     return aborts_with(&answer);
 }
 
@@ -170,7 +177,7 @@ static void test_sdo_server_checks_access_existence_and_value(void)
 static enum sdo_client_state exchange(struct can_frame frame)
 {
     struct can_frame answer;
-    TEST_ASSERT_TRUE(sdo_server_take(&server, &frame, &answer));
+    TEST_ASSERT_TRUE(sdo_server_take(&server, &frame, 0, &answer));
     TEST_ASSERT_TRUE(sdo_client_take(&client, &answer));
     return client.state;
 }
@@ -242,7 +249,7 @@ static void test_sdo_client_gives_up_with_an_abort(void)
     TEST_ASSERT_EQUAL(sdo_client_aborted, client.state);
     TEST_ASSERT_EQUAL_HEX32(od_abort_timeout, client.abort_code);
     TEST_ASSERT_EQUAL_HEX32(od_abort_timeout, aborts_with(&frame));
-    TEST_ASSERT_FALSE(sdo_server_take(&server, &frame, &answer)); // an abort is not answered
+    TEST_ASSERT_FALSE(sdo_server_take(&server, &frame, 0, &answer)); // an abort is not answered
     struct can_frame late = request(0x43, 0x6076, 2, 1);
     late.id = 0x585;
     TEST_ASSERT_TRUE(sdo_client_take(&client, &late));

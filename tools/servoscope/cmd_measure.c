@@ -4,6 +4,7 @@
 #include "tools/servoscope/command.h"
 #include "tools/servoscope/door.h"
 #include "tools/servoscope/measuring.h"
+#include "tools/servoscope/modbus_measuring.h"
 #include "tools/servoscope/options.h"
 
 #include <string.h>
@@ -63,6 +64,9 @@ static int run(int argc, char **argv, const struct command_context *context, str
     struct door door;
     measuring_defaults(&arguments.measuring);
     int status = read_options(argc, argv, &arguments, out_error);
+    if (!status && modbus_measuring_is(arguments.drive)) {
+        return modbus_measuring_run(&arguments.measuring, arguments.drive, context, out_error);
+    }
     arguments.measuring.drive_file = status ? NULL : model_path(arguments.drive);
     status = status ? status : measuring_prepare(&arguments.measuring, &measuring, out_error);
     if (status) {
@@ -71,7 +75,8 @@ static int run(int argc, char **argv, const struct command_context *context, str
     status = check_axis(&arguments, &measuring, out_error);
     status = status ? status : door_open(arguments.drive, NULL, &door, out_error);
     if (!status) {
-        measuring.door = &door;
+        measuring.door = door_has_statistics(&door) ? &door : NULL;
+        measuring.plan.lost_for_s = door.patience_s;
         status = measuring_run(&measuring, &door.drive, arguments.drive, context, out_error);
         door_close(&door);
     }

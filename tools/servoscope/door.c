@@ -1,105 +1,113 @@
 /* SPDX-License-Identifier: MIT */
 #include "tools/servoscope/door.h"
 
-#include "drivers/can/cia402_master.h"
-#include "lab/record/model_file.h"
-#include "ports/inproc.h"
-#include "sim/node/simulated_drive.h"
+#include "tools/servoscope/door_parts.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/// Bus, drive and master in one piece. The master is first: a pointer to it is a pointer to this.
-struct virtual_drive {
-    struct cia402_master master;
-    struct drive_operations operations; ///< the master's, but for open
-    enum drive_status (*open)(void *self, const struct drive_configuration *configuration);
-    struct inproc_bus bus;
-    struct simulated_drive node;
-    uint64_t opened_us;
-    uint64_t opened_busy_ns;
-};
-
-/// Chooses the bus's bit rate for the sample rate asked for, then opens as the master does.
-static enum drive_status open_virtual(void *object, const struct drive_configuration *configuration)
-{
-    struct virtual_drive *self = object;
-    const uint32_t slowest = 1000000, fastest = 8000000;
-    double needed =
-        cia402_master_cycle_bits(configuration->mode, true) * configuration->sample_rate_hz / CIA402_BUS_LOAD_LIMIT;
-    self->bus.bitrate = slowest;
-    while (self->bus.bitrate < needed && self->bus.bitrate < fastest)
-        self->bus.bitrate *= 2;
-    self->master.options.bitrate = self->bus.bitrate;
-    enum drive_status status = self->open(object, configuration);
-    self->opened_us = self->bus.now_ns / 1000;
-    self->opened_busy_ns = self->bus.counters.busy_ns;
-    return status;
-}
-
-static int open_simulator(const struct sim_model *model, struct door *out_door, struct error *out_error)
-{
-    struct virtual_drive *self = calloc(1, sizeof *self);
-    if (!self)
-        return error_set(out_error, error_refused, "out of memory");
-    struct can_port master_port, node_port;
-    const struct cia402_master_options options = cia402_master_defaults();
-    inproc_bus_init(&self->bus, options.bitrate, inproc_stuffing_worst);
-    inproc_bus_add_port(&self->bus, &master_port);
-    int node = inproc_bus_add_participant(&self->bus, &node_port);
-    simulated_drive_init(&self->node, model, options.node_id, &node_port);
-    const struct can_participant participant = simulated_drive_participant(&self->node);
-    inproc_bus_bind(&self->bus, node, &participant);
-    cia402_master_init(&self->master, &master_port, &options);
-    self->operations = *cia402_master_drive(&self->master).operations;
-    self->open = self->operations.open;
-    self->operations.open = open_virtual;
-    *out_door = (struct door){.drive = {.operations = &self->operations, .self = self}, .owner = self};
-    return error_none;
-}
+static const struct door_scheme *const schemes[] = {&door_simulated, &door_can, &door_slcan};
+enum { scheme_count = sizeof schemes / sizeof schemes[0] };
 
 int door_open(const char *url, const struct sim_model *model, struct door *out_door, struct error *out_error)
 {
-    static const char simulator[] = "sim:";
-    *out_door = (struct door){0};
-    if (strncmp(url, simulator, sizeof simulator - 1) != 0)
-        return error_set(out_error, error_usage,
-                         "--drive: '%s' is no drive that this program can reach; expected sim:MODEL.json", url);
-    const char *path = url + sizeof simulator - 1;
-    if (!model && *path == '\0')
-        return error_set(out_error, error_usage, "--drive: 'sim:' needs a model file: sim:MODEL.json");
-    struct sim_model read;
-    if (!model) {
-        int status = model_file_read(path, &read, out_error);
-        if (status != error_none)
+    char forms[300] = "";
+    *out_door = (struct door){.owner = NULL};
+    for (size_t i = 0; i < scheme_count; i++) {
+        const struct door_scheme *scheme = schemes[i];
+        size_t length = strlen(scheme->prefix), used = strlen(forms);
+        if (strncmp(url, scheme->prefix, length) == 0) {
+            int status = scheme->open(url + length, model, out_door, out_error);
+            out_door->scheme = scheme;
             return status;
-        model = &read;
+        }
+        snprintf(&forms[used], sizeof forms - used, "%s%s", i == 0 ? "" : i + 1 < scheme_count ? ", " : " or ",
+                 scheme->form);
     }
-    char text[200];
-    const char *wrong = sim_model_check(model, text, sizeof text);
-    if (wrong)
-        return error_set(out_error, error_refused, "%s: %s", *path ? path : "model", wrong);
-    return open_simulator(model, out_door, out_error);
+    return error_set(out_error, error_usage, "--drive: '%s' is no drive that this program can reach; expected %s", url,
+                     forms);
+}
+
+bool door_has_statistics(const struct door *self)
+{
+    return self->owner && self->scheme->read_statistics;
 }
 
 void door_read_statistics(const struct door *self, struct door_statistics *out_statistics)
 {
-    const struct virtual_drive *v = self->owner;
-    *out_statistics = (struct door_statistics){
-        .bitrate = v->bus.bitrate,
-        .bus_load = inproc_bus_load(&v->bus, v->opened_us, v->opened_busy_ns),
-        .frames = v->bus.counters.frames,
-        .targets_lost = v->node.node.errors.targets_lost + v->node.node.errors.targets_rejected,
-        .setpoints_clipped = v->master.saturated,
-        .samples_clipped = v->node.objects.saturated,
-    };
+    *out_statistics = (struct door_statistics){.bitrate = 0};
+    if (door_has_statistics(self))
+        self->scheme->read_statistics(self, out_statistics);
 }
 
 void door_close(struct door *self)
 {
     if (self->owner) {
         self->drive.operations->close(self->drive.self);
-        free(self->owner);
+        self->scheme->free(self);
     }
-    *self = (struct door){0};
+    *self = (struct door){.owner = NULL};
+}
+
+// ---- URL
+
+/// A number of a query, within its range.
+static int read_number(const char *name, const char *text, long lowest, long highest, long *out_value,
+                       struct error *out_error)
+{
+    char *end;
+    *out_value = strtol(text, &end, 10);
+    if (*text == '\0' || *end != '\0' || !(*out_value >= lowest && *out_value <= highest)) {
+        return error_set(out_error, error_usage, "--drive: %s=%s: expected a whole number from %ld to %ld", name, text,
+                         lowest, highest);
+    }
+    return 0;
+}
+
+static int read_pair(const struct door_scheme *scheme, char *pair, struct door_query *io_query, struct error *out_error)
+{
+    char *equals = strchr(pair, '=');
+    const char *value = equals ? equals + 1 : "";
+    if (equals) {
+        *equals = '\0';
+    }
+    if (strcmp(pair, "node") == 0) {
+        return read_number(pair, value, 1, 127, &io_query->node, out_error);
+    }
+    if (strcmp(pair, "bitrate") == 0) {
+        return read_number(pair, value, 10000, 1000000, &io_query->bitrate, out_error);
+    }
+    if (strcmp(pair, "sync_timeout_ms") == 0) {
+        return read_number(pair, value, 1, 10000, &io_query->sync_timeout_ms, out_error);
+    }
+    if (strcmp(pair, "profile") == 0 && *value != '\0') {
+        snprintf(io_query->profile, sizeof io_query->profile, "%s", value);
+        return 0;
+    }
+    return error_set(out_error, error_usage, "--drive: '%s' is nothing that can be asked behind '?'; expected %s", pair,
+                     scheme->form);
+}
+
+int door_read_query(const struct door_scheme *scheme, const char *rest, struct door_query *out_query,
+                    struct error *out_error)
+{
+    char pairs[256];
+    const char *mark = strchr(rest, '?');
+    int length = mark ? (int)(mark - rest) : (int)strlen(rest);
+    *out_query = (struct door_query){.node = 5, .bitrate = 1000000};
+    if (length == 0 || (size_t)length >= sizeof out_query->address || (mark && strlen(mark) >= sizeof pairs)) {
+        return error_set(out_error, error_usage, "--drive: '%s%s': expected %s", scheme->prefix, rest, scheme->form);
+    }
+    snprintf(out_query->address, sizeof out_query->address, "%.*s", length, rest);
+    snprintf(pairs, sizeof pairs, "%s", mark ? mark + 1 : "");
+    int status = 0;
+    for (char *at = pairs; *at != '\0' && !status;) {
+        char *end = at + strcspn(at, "&");
+        char *next = *end == '&' ? end + 1 : end;
+        *end = '\0';
+        status = read_pair(scheme, at, out_query, out_error);
+        at = next;
+    }
+    return status;
 }

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: MIT */
+#include "drivers/modbus/registers.h"
+
+#define RO(address, words, kind, name)                                                                                 \
+    {                                                                                                                  \
+        address, words, kind, modbus_read_only, name, 0, 0                                                             \
+    }
+#define ANY_U16 0, 0xFFFFu
+#define ANY_U32 0, 0xFFFFFFFFu
+
+/* In the order of enum modbus_field_id, which is that of the addresses. */
+const struct modbus_field modbus_fields[modbus_field_count] = {
+    RO(0x0000, 1, modbus_u16, "ID"),
+    RO(0x0001, 1, modbus_u16, "MAP_VERSION"),
+    RO(0x0002, 2, modbus_u32, "ORDER_PROBE"),
+    RO(0x0004, 2, modbus_f32, "FLOAT_PROBE"),
+    RO(0x0006, 1, modbus_u16, "CHUNK_WORDS"),
+    RO(0x0007, 1, modbus_u16, "BINS_MAX"),
+    RO(0x0008, 2, modbus_u32, "TABLE_BYTES_MAX"),
+    RO(0x000A, 2, modbus_u32, "SAMPLES_MAX"),
+    RO(0x000C, 1, modbus_u16, "PERIODS_KEPT"),
+    RO(0x000D, 1, modbus_u16, "MEAN_BINS"),
+    RO(0x000E, 1, modbus_u16, "PERIOD_BINS"),
+    RO(0x000F, 1, modbus_u16, "AXIS"),
+    {0x0010, 1, modbus_u16, modbus_write, "COMMAND", ANY_U16},
+    {0x0011, 1, modbus_u16, modbus_write, "COMMAND_KEY", ANY_U16},
+    {0x0012, 1, modbus_u16, modbus_write, "COMMAND_SEQUENCE", ANY_U16},
+    {0x001F, 1, modbus_u16, modbus_write, "NONCE", ANY_U16},
+    RO(0x0020, 1, modbus_u16, "STATE"),
+    RO(0x0021, 1, modbus_u16, "COMMAND_ACK"),
+    RO(0x0022, 1, modbus_u16, "RESULT"),
+    RO(0x0023, 1, modbus_u16, "END"),
+    RO(0x0024, 2, modbus_u32, "FAULTS"),
+    RO(0x0026, 2, modbus_u32, "PERIODS_DONE"),
+    RO(0x0028, 2, modbus_u32, "PERIODS_VALID"),
+    RO(0x002A, 2, modbus_u32, "SAMPLES_PLAYED"),
+    RO(0x002C, 2, modbus_u32, "TORQUE_CLIPPED"),
+    RO(0x002E, 2, modbus_u32, "CYCLES_MAX"),
+    RO(0x0030, 2, modbus_f32, "TORQUE"),
+    RO(0x0032, 2, modbus_f32, "POSITION"),
+    RO(0x0034, 2, modbus_f32, "VELOCITY"),
+    RO(0x0036, 2, modbus_f32, "TRIP_VALUE"),
+    RO(0x0038, 2, modbus_u32, "TABLE_NAME"),
+    RO(0x003A, 2, modbus_u32, "TABLE_SAMPLES"),
+    RO(0x003C, 2, modbus_u32, "TABLE_BINS"),
+    RO(0x003E, 2, modbus_f32, "RATE"),
+    {0x0040, 2, modbus_u32, modbus_setup, "TABLE_BYTES", ANY_U32},
+    {0x0042, 2, modbus_u32, modbus_setup, "TABLE_CRC32", ANY_U32},
+    {0x0044, 1, modbus_u16, modbus_setup, "MODE", 0, 1},
+    {0x0045, 1, modbus_u16, modbus_setup, "INPUT", 0, 3},
+    {0x0046, 1, modbus_u16, modbus_setup, "OUTPUT", 0, 3},
+    {0x0047, 1, modbus_u16, modbus_setup, "APPROACH", 0, 1},
+    {0x0048, 2, modbus_u32, modbus_setup, "SETTLE_PERIODS", 0, 1000000},
+    {0x004A, 2, modbus_u32, modbus_setup, "MEASURE_PERIODS", 1, 1000000},
+    {0x004C, 2, modbus_u32, modbus_setup, "FADE_SAMPLES", 0, 1 << 24},
+    {0x004E, 2, modbus_u32, modbus_setup, "ABORT_SAMPLES", 1, 1 << 24},
+    {0x0050, 2, modbus_f32, modbus_setup, "TORQUE_LIMIT", 0, 1},
+    {0x0052, 2, modbus_f32, modbus_setup, "VELOCITY_LIMIT", 0, 1},
+    {0x0054, 2, modbus_f32, modbus_setup, "POSITION_MIN", 0, 0},
+    {0x0056, 2, modbus_f32, modbus_setup, "POSITION_MAX", 0, 0},
+    {0x0058, 2, modbus_f32, modbus_setup, "FOLLOWING_ERROR", 0, 1},
+    {0x005A, 2, modbus_u32, modbus_setup, "DWELL_SAMPLES", 0, 1 << 24},
+    {0x005C, 2, modbus_u32, modbus_setup, "HOST_TIMEOUT_MS", 0, 3600000},
+    {0x0080, 1, modbus_u16, modbus_write, "BIN_FIRST", ANY_U16},
+    RO(0x0081, modbus_bin_window, modbus_window, "BIN_DATA"),
+    {0x0100, 2, modbus_u32, modbus_data, "UPLOAD_OFFSET", ANY_U32},
+    {0x0102, modbus_chunk_words, modbus_window, modbus_data, "UPLOAD_DATA", 0, 0},
+    {0x0200, 2, modbus_u32, modbus_write, "READ_PERIOD", ANY_U32},
+    {0x0202, 1, modbus_u16, modbus_write, "READ_FIRST", ANY_U16},
+    {0x0203, 1, modbus_u16, modbus_write, "READ_SEQUENCE", ANY_U16},
+    RO(0x0210, modbus_spectrum_words, modbus_window, "SPECTRUM"),
+};

@@ -1,0 +1,337 @@
+/* SPDX-License-Identifier: MIT */
+/* Instructions of each call, the most of all calls: inputs that take the longest way through each function are made here on
+ * purpose, and where several could be the longest all are tried. A line each: name, instructions. Runs on the MPS2 boards,
+ * with -icount shift=6; a core's code may run on a bigger core's model, the instructions are the same. */
+#include "core/crc32.h"
+#include "firmware/board.h"
+#include "firmware/print.h"
+#include "frf/block.h"
+#include "frf/dft.h"
+#include "guard/guard.h"
+#include "msgen/player.h"
+
+#include "excitation.h"
+#include "measurement.h"
+
+enum {
+    bins_max = 200,
+    channels_max = 3,
+    block = 32,
+    period = 640, /* whole blocks, and half a second's worth of counting */
+    small_period = 8,
+    exact_bins = 32,
+};
+
+static uint32_t overhead; /* of reading the counter twice */
+
+static uint32_t since(uint32_t begin)
+{
+    uint32_t all = board_instructions() - begin;
+    return all > overhead ? all - overhead : 0;
+}
+
+static void calibrate(void)
+{
+    uint32_t least = UINT32_MAX;
+    for (unsigned i = 0; i < 16u; ++i) {
+        uint32_t begin = board_instructions(), all = board_instructions() - begin;
+        least = all < least ? all : least;
+    }
+    overhead = least;
+}
+
+static void keep_most(uint32_t *io_most, uint32_t value)
+{
+    *io_most = value > *io_most ? value : *io_most;
+}
+
+static void print_count(const char *name, uint32_t value)
+{
+    board_print(name);
+    board_print(" ");
+    print_u32(value);
+    board_print("\n");
+}
+
+static void require(enum core_status status)
+{
+    if (status != core_ok) {
+        board_print(core_status_str(status));
+        board_exit(1);
+    }
+}
+
+// ---- Player
+
+static uint8_t travelling[msgen_header_travel_bytes + 4u + small_period * 3u * 4u];
+
+/* A table that travels, of alternating extremes: every product is as long as it gets. */
+static void make_travelling_table(struct msgen_table *out_table)
+{
+    struct msgen_table header = {.rate_num_hz = 8000,
+                                 .rate_den = 1,
+                                 .period_samples = small_period,
+                                 .bin_count = 1,
+                                 .channels = 3,
+                                 .format = msgen_format_i32,
+                                 .travel_q30 = ((int64_t)12345 << 30) + 7};
+    uint8_t *data = travelling + msgen_header_travel_bytes;
+    for (uint32_t i = 0; i < 3u; ++i) {
+        header.scale_bits[i] = 0x3F800000u;
+    }
+    data[0] = 1u;
+    for (uint32_t i = 0; i < small_period * 3u; ++i) {
+        data[4u + 4u * i + 2u] = (uint8_t)(i % 2u == 0 ? 0x7Fu : 0x80u);
+        data[4u + 4u * i + 3u] = (uint8_t)(i % 2u == 0 ? 0x00u : 0xFFu);
+    }
+    header.data_crc32 = core_crc32(0, data, 4u + small_period * 3u * 4u);
+    require(msgen_table_encode_header(&header, travelling));
+    require(msgen_table_open(travelling, sizeof travelling, out_table));
+}
+
+static uint32_t count_run(struct msgen_player *player, uint32_t abort_at)
+{
+    uint32_t most = 0;
+    int32_t samples[msgen_channels_max];
+    for (uint32_t i = 0; i < 400u && player->phase != msgen_phase_done; ++i) {
+        uint32_t begin = board_instructions();
+        msgen_player_step(player, samples);
+        keep_most(&most, since(begin));
+        if (i == abort_at) {
+            begin = board_instructions();
+            msgen_player_abort(player);
+            keep_most(&most, since(begin));
+        }
+    }
+    return most;
+}
+
+static void count_player(void)
+{
+    struct msgen_table table;
+    struct msgen_player player;
+    struct msgen_player_config config = {.periods = 3, .abort_samples = 20};
+    uint32_t most = 0;
+    make_travelling_table(&table);
+    for (unsigned way = 0; way < 4u; ++way) {
+        config.fade_in_samples = way % 2u == 0 ? 30u : 0;
+        config.approach_samples = way % 2u == 0 ? 0 : 30u;
+        config.dwell_samples = way % 2u == 0 ? 0 : 10u;
+        config.fade_out_samples = 30u;
+        for (unsigned c = 0; c < msgen_channels_max; ++c) {
+            config.gain_q16[c] = way < 2u ? -msgen_gain_one + 1 : 0;
+            config.limit[c] = way < 2u ? 100000 : 0;
+        }
+        for (uint32_t abort_at = 0; abort_at < 90u; abort_at += 15u) {
+            if (msgen_player_init(&player, &table, &config) == core_ok) {
+                keep_most(&most, count_run(&player, abort_at));
+            }
+        }
+    }
+    print_count("msgen_player_step", most);
+
+    uint32_t begin = board_instructions();
+    enum core_status status = msgen_table_open(excitation_mst, sizeof excitation_mst, &table);
+    print_count("msgen_table_open", since(begin));
+    require(status);
+    config.fade_in_samples = 30u;
+    config.approach_samples = config.dwell_samples = 0;
+    require(msgen_player_init(&player, &table, &config));
+    int32_t samples[msgen_channels_max];
+    for (uint32_t i = 0; i < 40u; ++i) {
+        begin = board_instructions();
+        msgen_player_step(&player, samples);
+        most = since(begin);
+    }
+    print_count("msgen_player_step/whole-period", most);
+    begin = board_instructions();
+    volatile uint32_t crc = core_crc32(0, excitation_mst, 1024u);
+    print_count("core_crc32/1024-bytes", since(begin));
+    (void)crc;
+}
+
+// ---- Guard
+
+static void count_guard(void)
+{
+    static const struct guard_limits limits = {-100000, 100000, 20000, 16000, 50, 50, 100};
+    static const int32_t extremes[] = {INT32_MIN, -100001, -100000, -1, 0, 1, 99999, 100001, INT32_MAX};
+    const unsigned count = sizeof extremes / sizeof *extremes;
+    const struct guard_sample inside = {0, 0, 200, true};
+    struct guard guard;
+    uint32_t most = 0, most_clip = 0;
+    for (unsigned i = 0; i < count * count * count; ++i) {
+        struct guard_sample sample = {extremes[i % count], extremes[i / count % count], extremes[i / count / count], i % 7u != 0};
+        require(guard_init(&guard, &limits));
+        require(guard_arm(&guard, &inside));
+        for (unsigned n = 0; n < 3u; ++n) {
+            uint32_t begin = board_instructions();
+            guard_step(&guard, &sample);
+            keep_most(&most, since(begin));
+            begin = board_instructions();
+            guard_clip_torque(&guard, sample.torque);
+            keep_most(&most_clip, since(begin));
+            guard_alive(&guard.state);
+        }
+    }
+    for (unsigned way = 0; way < 2u; ++way) { /* the two causes that take time */
+        require(guard_arm(&guard, &inside));
+        for (unsigned n = 0; n < 60u; ++n) {
+            if (way == 0) {
+                guard_alive(&guard.state);
+            }
+            uint32_t begin = board_instructions();
+            guard_step(&guard, &inside);
+            keep_most(&most, since(begin));
+        }
+    }
+    print_count("guard_step", most);
+    print_count("guard_clip_torque", most_clip);
+}
+
+// ---- DFT
+
+static int32_t coefficients[FRF_BLOCK_TABLE_WORDS(bins_max, block, block)];
+static int32_t storage[FRF_BLOCK_STORAGE_WORDS(bins_max, channels_max, 2u, block, block)];
+static int16_t kept[FRF_BLOCK_FRAME_SAMPLES(channels_max, block)];
+static uint32_t bins[bins_max];
+static union frf_word words[FRF_STORAGE_WORDS(exact_bins, channels_max)];
+
+/* The kernels take the same time whatever they multiply; the limits of the converter are what costs most. */
+static void fill(int16_t *out_frame)
+{
+    for (unsigned c = 0; c < channels_max; ++c) {
+        out_frame[c] = INT16_MIN;
+    }
+}
+
+/* Over two periods. */
+static void count_frames(struct frf_block *dft, uint32_t *out_mean, uint32_t *out_longest)
+{
+    int16_t frame[channels_max];
+    uint32_t all = 0;
+    fill(frame);
+    *out_longest = 0;
+    for (uint32_t n = 0; n < 2u * period; ++n) {
+        uint32_t begin = board_instructions();
+        frf_block_add_i16(dft, frame, 1);
+        uint32_t count = since(begin);
+        keep_most(out_longest, count);
+        all += count;
+    }
+    *out_mean = all / (2u * period);
+}
+
+/* Over two periods, fed a block at a time: what an interrupt that only collects leaves to somebody else. */
+static uint32_t count_blocks(struct frf_block *dft)
+{
+    static int16_t frames[(block + 1) * channels_max];
+    uint32_t all = 0;
+    for (uint32_t i = 0; i < block; ++i) {
+        fill(frames + i * dft->channels);
+    }
+    for (uint32_t n = 0; n < 2u * period; n += block) {
+        uint32_t begin = board_instructions();
+        frf_block_add_i16(dft, frames, block);
+        all += since(begin);
+    }
+    return all / (2u * period);
+}
+
+static void print_block_count(const char *what, uint32_t bin_count, uint32_t channels, uint32_t value)
+{
+    board_print("frf_block_add_i16/");
+    board_print(what);
+    board_print("/");
+    print_u32(bin_count);
+    board_print("-bins/");
+    print_u32(channels);
+    print_count(channels == 1u ? "-channel" : "-channels", value);
+}
+
+static void count_block(uint32_t bin_count, uint32_t channels)
+{
+    const struct frf_block_layout layout = {block, block, 1};
+    struct frf_block_table table;
+    struct frf_block_config config = {.table = &table,
+                                      .channels = channels,
+                                      .banks = 2,
+                                      .storage = storage,
+                                      .storage_words = sizeof storage / sizeof *storage,
+                                      .frames = kept,
+                                      .frame_samples = sizeof kept / sizeof *kept};
+    struct frf_block dft;
+    uint32_t mean, longest;
+    for (uint32_t b = 0; b < bin_count; ++b) {
+        bins[b] = 1u + b;
+    }
+    require(frf_block_build(coefficients, sizeof coefficients / sizeof *coefficients, bins, bin_count, period, &layout, &table));
+    require(frf_block_init(&dft, &config));
+    count_frames(&dft, &mean, &longest);
+    print_block_count("at-once-longest", bin_count, channels, longest);
+    print_block_count("in-blocks-mean", bin_count, channels, count_blocks(&dft));
+    config.spread = true;
+    require(frf_block_init(&dft, &config));
+    count_frames(&dft, &mean, &longest);
+    print_block_count("spread-longest", bin_count, channels, longest);
+    print_block_count("spread-mean", bin_count, channels, mean);
+
+    struct frf_block_period latched;
+    int64_t real, imaginary;
+    uint32_t begin = board_instructions();
+    bool there = frf_block_latest(&dft, &latched);
+    uint32_t latest = since(begin);
+    begin = board_instructions();
+    frf_block_sums(&dft, &latched, bin_count - 1u, channels - 1u, &real, &imaginary);
+    uint32_t sums = since(begin);
+    if (!there) {
+        board_exit(1);
+    }
+    if (bin_count == bins_max && channels == channels_max) {
+        print_count("frf_block_latest", latest);
+        print_count("frf_block_sums", sums);
+        begin = board_instructions();
+        frf_block_skip(&dft, 1);
+        print_count("frf_block_skip/1", since(begin));
+    }
+}
+
+static uint32_t count_exact(struct frf_dft *dft)
+{
+    int16_t frame[channels_max];
+    uint32_t most = 0;
+    fill(frame);
+    for (uint32_t n = 0; n < MEASUREMENT_PERIOD_SAMPLES; ++n) {
+        uint32_t begin = board_instructions();
+        frf_dft_add_i16(dft, frame, 1);
+        keep_most(&most, since(begin));
+    }
+    return most;
+}
+
+static void count_exact_channels(uint32_t channels)
+{
+    const struct frf_dft_config config = {measurement_bins, exact_bins, channels, words, sizeof words / sizeof *words, 0, 0};
+    struct frf_dft dft;
+    require(frf_dft_init_q15(&dft, &config, &measurement_twiddles_q15));
+    print_count(channels == 1u ? "frf_dft_add_i16/q15/32-bins/1-channel" : "frf_dft_add_i16/q15/32-bins/2-channels", count_exact(&dft));
+    require(frf_dft_init_q31(&dft, &config, &measurement_twiddles_q31));
+    print_count(channels == 1u ? "frf_dft_add_i16/q31/32-bins/1-channel" : "frf_dft_add_i16/q31/32-bins/2-channels", count_exact(&dft));
+}
+
+int main(void)
+{
+    static const uint32_t bin_counts[] = {32, 64, 200};
+    board_start_counter();
+    calibrate();
+    count_guard();
+    count_player();
+    count_exact_channels(1);
+    count_exact_channels(2);
+    for (unsigned b = 0; b < sizeof bin_counts / sizeof *bin_counts; ++b) {
+        for (uint32_t channels = 1; channels <= channels_max; ++channels) {
+            count_block(bin_counts[b], channels);
+        }
+    }
+    board_exit(0);
+}
