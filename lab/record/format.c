@@ -47,7 +47,7 @@ void format_notes_free(struct format_notes *self)
 const struct record_format *format_by_name(const char *name)
 {
     for (size_t i = 0; record_formats[i]; i++)
-        if (strcmp(record_formats[i]->name, name) == 0)
+        if (record_formats[i]->write && strcmp(record_formats[i]->name, name) == 0)
             return record_formats[i];
     return NULL;
 }
@@ -112,10 +112,10 @@ void format_list(bool readers, size_t size, char *out_text)
     size_t used = 0, left = 0;
     out_text[0] = '\0';
     for (size_t i = 0; record_formats[i]; i++)
-        left += !readers || record_formats[i]->recognise;
+        left += readers ? record_formats[i]->recognise != NULL : record_formats[i]->write != NULL;
     bool first = true;
     for (size_t i = 0; record_formats[i] && used < size; i++) {
-        if (readers && !record_formats[i]->recognise)
+        if (readers ? !record_formats[i]->recognise : !record_formats[i]->write)
             continue;
         const char *between = first ? "" : left > 1 ? ", " : " or ";
         used += (size_t)snprintf(out_text + used, size - used, "%s%s", between, record_formats[i]->name);

@@ -78,14 +78,14 @@ struct record_format {
     int (*read)(const char *path, const struct format_options *options, struct record *out_record,
                 struct format_notes *io_notes, struct error *out_error);
 
-    /// Writes a file that is whole or as it was (lab/record/atomic_file.h).
+    /// Writes a file that is whole or as it was (lab/record/atomic_file.h). NULL: files of others, which are only read.
     int (*write)(const char *path, const struct record *record, struct format_notes *io_notes, struct error *out_error);
 };
 
 /// NULL-terminated, sorted by file name, made by the build.
 extern const struct record_format *const record_formats[];
 
-/// The format of a --to; NULL if there is none.
+/// The format of a --to, one that is written; NULL if there is none.
 const struct record_format *format_by_name(const char *name);
 
 /// The format that a file's name ends in; NULL if none does. Upper case counts as lower.
@@ -95,7 +95,7 @@ const struct record_format *format_by_ending(const char *path);
 /// Errors: error_refused if it cannot be read or no format knows it.
 int format_by_content(const char *path, const struct record_format **out_format, struct error *out_error);
 
-/// Writes the names of all formats, or of those that are read, "csv, mat or uff", into out_text.
+/// Writes the names of the formats that are read, or of those that are written, "csv, mat or uff", into out_text.
 void format_list(bool readers, size_t size, char *out_text);
 
 #endif

@@ -174,6 +174,16 @@ static void read_column(const char *name, struct column *out)
     out->rank = 2 * HAS_WORD(out, measured_words) + HAS_WORD(out, motor_words);
 }
 
+bool run_guess_scale(const char *name, double *out_scale)
+{
+    struct column column = {.rank = -1};
+    split_words(name, &column);
+    find_unit(&column);
+    if (column.known)
+        *out_scale = column.scale;
+    return column.known;
+}
+
 static void write_name(enum quantity quantity, bool set_point, bool load, char *out_name, size_t size)
 {
     snprintf(out_name, size, "%s%s%s_%s", load ? "load_" : "", quantities[quantity].stem, set_point ? "_ref" : "",

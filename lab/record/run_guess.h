@@ -9,6 +9,8 @@
 #include "lab/record/run_names.h"
 #include "lab/record/text_table.h"
 
+#include <stdbool.h>
+
 /// Finds names for columns that a run does not know.
 ///
 /// Unit:      the last word of a name that is one (`iq_meas_A`, `speed [rpm]`, `enc1_mm`), units of a single letter
@@ -23,6 +25,10 @@
 /// Test:   tests/unit/test_run_guess.c
 int run_guess_map(const struct text_table *table, const char *const *keep, size_t keep_count, struct run_map *out_map,
                   struct error *out_error);
+
+/// The factor that brings a column's values to SI by the unit at the end of its name ("pos [mm]": 0.001); false, and
+/// *out_scale as it was, if it names none that is known.
+bool run_guess_scale(const char *name, double *out_scale);
 
 /// Adds the key `columns_named` with the map as text, if it names anything.
 /// Errors: error_refused if memory is short

@@ -153,7 +153,8 @@ static int check_names(const struct text_table *table, struct error *out_error)
     const char *only = table->columns[0].name;
     if (table->column_count == 1 && (strchr(only, ';') || strchr(only, '\t')))
         return error_set(out_error, error_refused,
-                         "%s:%zu: columns are separated by %s: commas were expected, and a point as decimal mark",
+                         "%s:%zu: columns are separated by %s: commas were expected, and a point as decimal mark; "
+                         "'servoscope convert' makes such a file of it",
                          table->path, table->names_line, strchr(only, ';') ? "semicolons" : "tabs");
     return error_none;
 }

@@ -82,8 +82,8 @@ grep -q 'assumed: sample rate 2999 Hz, by --rate' said || fail "$(cat said)"
 
 # Refusals; none of them leaves anything.
 refuse 2 'IN OUT is missing' run.csv
-refuse 2 "its ending names no format: expected --to csv, mat, mat73, uff or uff58b" run.csv x.dat
-refuse 2 "--to: 'xls', expected csv, mat" run.csv x.csv --to xls
+refuse 2 "its ending names no format: expected --to csv, gnuplot, mat, mat73, uff or uff58b" run.csv x.dat
+refuse 2 "--to: 'xls', expected csv, gnuplot, mat" run.csv x.csv --to xls
 refuse 1 'none.csv: cannot be read' none.csv x.csv
 refuse 1 'model.json: holds neither a run nor a frequency response' model.json x.csv
 refuse 1 'table.mst: holds neither' table.mst x.csv

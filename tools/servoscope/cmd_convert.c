@@ -176,14 +176,16 @@ const struct command command_cmd_convert = {
     .name = "convert",
     .summary = "runs and frequency responses between CSV, MATLAB and universal files",
     .help =
-        "servoscope convert: runs and frequency responses between CSV, MATLAB and universal files\n"
+        "servoscope convert: runs and frequency responses between CSV, MATLAB, universal and other programs' files\n"
         "\n"
         "usage: servoscope convert IN OUT [options]\n"
         "\n"
-        "  IN                   its content says its format, plain or gzipped (but for .mat)\n"
-        "  OUT                  its ending says its format: .csv, .mat, .uff or .unv\n"
+        "  IN                   its content says its format, plain or gzipped (but for .mat): those below,\n"
+        "                       text exports of the TwinCAT Scope, tables with tabs, semicolons or decimal commas\n"
+        "  OUT                  its ending says its format: .csv, .gp, .mat, .uff or .unv\n"
         "  --to FORMAT          whatever the ending:\n"
         "                       csv     servoscope's own files, the only ones that lose nothing\n"
+        "                       gnuplot a script with the numbers in it, to look at: gnuplot -p FILE.gp\n"
         "                       mat     MATLAB, version 5\n"
         "                       mat73   MATLAB, version 7.3 (HDF5), for more than 2 GiB a signal\n"
         "                       uff     universal file, dataset 58 in text, 13 digits\n"
@@ -191,6 +193,7 @@ const struct command command_cmd_convert = {
         "  --map NAME=COLUMN[*SCALE],...  --rate HZ    for recordings of others: NAME is one of docs/files.md, "
         "COLUMN what the file calls it:\n"
         "                       in a .mat a variable, log.speed for a field, data:2 for the second column of a matrix\n"
+        "                       a unit in the file's header counts; of several sample times --rate chooses one\n"
         "  --function NUMBER    which of the frequency responses of a universal file\n"
         "\n"
         "What was assumed, what the format has no place for and where it was kept, and what is lost, is printed.\n"
