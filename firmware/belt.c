@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware/belt.h"
 
-#define POSITION_GAIN_PER_S         40.0f
-#define VELOCITY_GAIN_NMS_PER_RAD   0.3f
-#define INTEGRAL_GAIN_NM_PER_RAD    10.0f
-#define INTEGRAL_LIMIT_NM           1.0f
+#define POSITION_GAIN_PER_S       40.0f
+#define VELOCITY_GAIN_NMS_PER_RAD 0.3f
+#define INTEGRAL_GAIN_NM_PER_RAD  10.0f
+#define INTEGRAL_LIMIT_NM         1.0f
 
 void belt_init(struct belt *self)
 {
@@ -35,8 +35,7 @@ struct belt_sample belt_measure(struct belt *self)
     struct belt_sample sample;
     sample.position = round_down(self->motor_position_rad * BELT_POSITION_COUNTS_PER_RAD);
     sample.torque = convert(self->torque_Nm * BELT_TORQUE_COUNTS_PER_NM, noise_counts(self));
-    sample.velocity =
-        convert(self->motor_velocity_rad_per_s * BELT_VELOCITY_COUNTS_PER_RAD_PER_S, noise_counts(self));
+    sample.velocity = convert(self->motor_velocity_rad_per_s * BELT_VELOCITY_COUNTS_PER_RAD_PER_S, noise_counts(self));
     return sample;
 }
 

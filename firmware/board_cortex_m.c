@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Cortex-M under QEMU: SysTick for the samples, semihosting for text and exit status. Instructions are counted by the
- * CMSDK timer of the MPS2 boards: with -icount shift=S an instruction takes 2^S ns of its clock, a tick of 25 MHz 40. */
+ * CMSDK timer of the MPS2 boards: with -icount shift=S an instruction takes 2^S ns of its clock, a tick of 25 MHz 40.
+ * */
 #include "firmware/board.h"
 
 void board_sample_interrupt(void);

@@ -23,9 +23,7 @@ bool board_is_late(void)
     return false;
 }
 
-void board_start_counter(void)
-{
-}
+void board_start_counter(void) {}
 
 uint32_t board_instructions(void)
 {

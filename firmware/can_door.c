@@ -128,11 +128,20 @@ static void keep_answer(struct can_door *self)
     uint32_t bin = (self->step - 1u) / requests_per_bin;
     struct can_reading *reading = &self->readings[bin];
     switch ((self->step - 1u) % requests_per_bin) {
-    case 1: reading->real = self->client.value; break;
-    case 2: reading->imaginary = self->client.value; break;
-    case 3: reading->std = self->client.value; break;
-    case 4: reading->validity = (uint8_t)self->client.value; break;
-    default: break;
+    case 1:
+        reading->real = self->client.value;
+        break;
+    case 2:
+        reading->imaginary = self->client.value;
+        break;
+    case 3:
+        reading->std = self->client.value;
+        break;
+    case 4:
+        reading->validity = (uint8_t)self->client.value;
+        break;
+    default:
+        break;
     }
 }
 

@@ -17,11 +17,11 @@ struct can_queue {
 
 /// What the node offers, object 2200; real numbers are the bits of an IEEE single.
 struct can_results {
-    uint32_t periods;          ///< :1 periods that count
-    uint16_t bin;              ///< :2 which bin the rest is about; writable
-    uint32_t real, imaginary;  ///< :3 :4 rad/s per Nm
-    uint32_t std;              ///< :5
-    uint8_t validity;          ///< :6 enum frf_validity
+    uint32_t periods;         ///< :1 periods that count
+    uint16_t bin;             ///< :2 which bin the rest is about; writable
+    uint32_t real, imaginary; ///< :3 :4 rad/s per Nm
+    uint32_t std;             ///< :5
+    uint8_t validity;         ///< :6 enum frf_validity
     const struct results *source;
 };
 

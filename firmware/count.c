@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Instructions of each call, the most of all calls: inputs that take the longest way through each function are made here on
- * purpose, and where several could be the longest all are tried. A line each: name, instructions. Runs on the MPS2 boards,
- * with -icount shift=6; a core's code may run on a bigger core's model, the instructions are the same. */
+/* Instructions of each call, the most of all calls: inputs that take the longest way through each function are made
+ * here on purpose, and where several could be the longest all are tried. A line each: name, instructions. Runs on the
+ * MPS2 boards, with -icount shift=6; a core's code may run on a bigger core's model, the instructions are the same. */
 #include "core/crc32.h"
 #include "firmware/board.h"
 #include "firmware/print.h"
@@ -89,21 +89,19 @@ static void make_travelling_table(struct msgen_table *out_table)
     require(msgen_table_open(travelling, sizeof travelling, out_table));
 }
 
-static uint32_t count_run(struct msgen_player *player, uint32_t abort_at)
+static void count_run(struct msgen_player *player, uint32_t abort_at, uint32_t *io_step, uint32_t *io_abort)
 {
-    uint32_t most = 0;
     int32_t samples[msgen_channels_max];
     for (uint32_t i = 0; i < 400u && player->phase != msgen_phase_done; ++i) {
         uint32_t begin = board_instructions();
         msgen_player_step(player, samples);
-        keep_most(&most, since(begin));
+        keep_most(io_step, since(begin));
         if (i == abort_at) {
             begin = board_instructions();
             msgen_player_abort(player);
-            keep_most(&most, since(begin));
+            keep_most(io_abort, since(begin));
         }
     }
-    return most;
 }
 
 static void count_player(void)
@@ -111,7 +109,7 @@ static void count_player(void)
     struct msgen_table table;
     struct msgen_player player;
     struct msgen_player_config config = {.periods = 3, .abort_samples = 20};
-    uint32_t most = 0;
+    uint32_t most = 0, most_abort = 0;
     make_travelling_table(&table);
     for (unsigned way = 0; way < 4u; ++way) {
         config.fade_in_samples = way % 2u == 0 ? 30u : 0;
@@ -124,11 +122,12 @@ static void count_player(void)
         }
         for (uint32_t abort_at = 0; abort_at < 90u; abort_at += 15u) {
             if (msgen_player_init(&player, &table, &config) == core_ok) {
-                keep_most(&most, count_run(&player, abort_at));
+                count_run(&player, abort_at, &most, &most_abort);
             }
         }
     }
     print_count("msgen_player_step", most);
+    print_count("msgen_player_abort", most_abort);
 
     uint32_t begin = board_instructions();
     enum core_status status = msgen_table_open(excitation_mst, sizeof excitation_mst, &table);
@@ -161,7 +160,8 @@ static void count_guard(void)
     struct guard guard;
     uint32_t most = 0, most_clip = 0;
     for (unsigned i = 0; i < count * count * count; ++i) {
-        struct guard_sample sample = {extremes[i % count], extremes[i / count % count], extremes[i / count / count], i % 7u != 0};
+        struct guard_sample sample = {extremes[i % count], extremes[i / count % count], extremes[i / count / count],
+                                      i % 7u != 0};
         require(guard_init(&guard, &limits));
         require(guard_arm(&guard, &inside));
         for (unsigned n = 0; n < 3u; ++n) {
@@ -265,7 +265,8 @@ static void count_block(uint32_t bin_count, uint32_t channels)
     for (uint32_t b = 0; b < bin_count; ++b) {
         bins[b] = 1u + b;
     }
-    require(frf_block_build(coefficients, sizeof coefficients / sizeof *coefficients, bins, bin_count, period, &layout, &table));
+    require(frf_block_build(coefficients, sizeof coefficients / sizeof *coefficients, bins, bin_count, period, &layout,
+                            &table));
     require(frf_block_init(&dft, &config));
     count_frames(&dft, &mean, &longest);
     print_block_count("at-once-longest", bin_count, channels, longest);
@@ -311,12 +312,15 @@ static uint32_t count_exact(struct frf_dft *dft)
 
 static void count_exact_channels(uint32_t channels)
 {
-    const struct frf_dft_config config = {measurement_bins, exact_bins, channels, words, sizeof words / sizeof *words, 0, 0};
+    const struct frf_dft_config config = {
+        measurement_bins, exact_bins, channels, words, sizeof words / sizeof *words, 0, 0};
     struct frf_dft dft;
     require(frf_dft_init_q15(&dft, &config, &measurement_twiddles_q15));
-    print_count(channels == 1u ? "frf_dft_add_i16/q15/32-bins/1-channel" : "frf_dft_add_i16/q15/32-bins/2-channels", count_exact(&dft));
+    print_count(channels == 1u ? "frf_dft_add_i16/q15/32-bins/1-channel" : "frf_dft_add_i16/q15/32-bins/2-channels",
+                count_exact(&dft));
     require(frf_dft_init_q31(&dft, &config, &measurement_twiddles_q31));
-    print_count(channels == 1u ? "frf_dft_add_i16/q31/32-bins/1-channel" : "frf_dft_add_i16/q31/32-bins/2-channels", count_exact(&dft));
+    print_count(channels == 1u ? "frf_dft_add_i16/q31/32-bins/1-channel" : "frf_dft_add_i16/q31/32-bins/2-channels",
+                count_exact(&dft));
 }
 
 int main(void)

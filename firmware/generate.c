@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Writes the const tables of a measurement as a C header, made on the host so that nothing is calculated at start-up and
- * flash holds what does not change: bins, twiddles, the block DFT's coefficients. Reads an .mst file.
+/* Writes the const tables of a measurement as a C header, made on the host so that nothing is calculated at start-up
+ * and flash holds what does not change: bins, twiddles, the block DFT's coefficients. Reads an .mst file.
  * usage: generate TABLE.mst BLOCK_SAMPLES >measurement.h */
 #include "frf/block_table.h"
 #include "frf/twiddle.h"

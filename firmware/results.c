@@ -3,14 +3,22 @@
 
 #include "firmware/checksum.h"
 
-enum core_status results_init(struct results *self, uint32_t bin_count, core_real output_units_per_input)
+/* Sums are kept times 2^-40, which keeps single precision far from its limits. */
+#define SUM_SCALE ((core_real)(1.0 / 1099511627776.0))
+
+enum core_status results_init(struct results *self, const struct frf_block_table *table, core_real input_per_count,
+                              core_real output_per_count)
 {
-    self->output_units_per_input = output_units_per_input;
+    /* frf_block_sums() gives 2^(30 + gain_shift) times the sum; a line's amplitude is 2/N of that. */
+    core_real amplitude = (core_real)2048 / (core_real)((uint32_t)1 << table->gain_shift);
+    amplitude /= (core_real)table->period_samples;
+    self->input_unit = amplitude * input_per_count;
+    self->output_unit = amplitude * output_per_count;
     self->sequence = self->overwritten = self->invalid = 0;
     self->checksum[0] = 1u;
     self->checksum[1] = 0;
-    return bin_count > results_bins_max ? core_err_storage
-                                        : frf_statistics_init(&self->statistics, self->pairs, bin_count);
+    return table->bin_count > results_bins_max ? core_err_storage
+                                               : frf_statistics_init(&self->statistics, self->pairs, table->bin_count);
 }
 
 static struct frf_complex take_sum(const struct frf_block *dft, const struct frf_block_period *period, uint32_t bin,
@@ -20,9 +28,7 @@ static struct frf_complex take_sum(const struct frf_block *dft, const struct frf
     frf_block_sums(dft, period, bin, channel, &real, &imaginary);
     checksum_add(io_checksum, real);
     checksum_add(io_checksum, imaginary);
-    /* The table's gain is the same for both channels; the 2^-40 keeps single precision far from its limits. */
-    const core_real scale = (core_real)(1.0 / 1099511627776.0);
-    struct frf_complex value = {(core_real)real * scale, (core_real)imaginary * scale};
+    struct frf_complex value = {(core_real)real * SUM_SCALE, (core_real)imaginary * SUM_SCALE};
     return value;
 }
 
@@ -54,7 +60,8 @@ bool results_take(struct results *self, const struct frf_block *dft, uint32_t in
 void results_estimate(const struct results *self, uint32_t bin, struct frf_estimate *out_estimate)
 {
     frf_statistics_estimate(&self->statistics, bin, (core_real)0, out_estimate);
-    out_estimate->real *= self->output_units_per_input;
-    out_estimate->imaginary *= self->output_units_per_input;
-    out_estimate->std *= self->output_units_per_input;
+    core_real unit = self->output_unit / self->input_unit;
+    out_estimate->real *= unit;
+    out_estimate->imaginary *= unit;
+    out_estimate->std *= unit;
 }

@@ -13,13 +13,16 @@ struct results {
     struct frf_statistics statistics;
     struct frf_pair pairs[results_bins_max];
     struct frf_complex input[results_bins_max], output[results_bins_max];
-    core_real output_units_per_input; ///< rad/s per count of velocity over Nm per count of torque
-    uint32_t sequence;                ///< of the last period looked at
-    uint32_t overwritten, invalid;    ///< periods left out
-    uint32_t checksum[2];             ///< over all sums of all periods that count
+    core_real input_unit, output_unit; ///< Nm and rad/s of a line of amplitude 1: per sum as it is kept here
+    uint32_t sequence;                 ///< of the last period looked at
+    uint32_t overwritten, invalid;     ///< periods left out
+    uint32_t checksum[2];              ///< over all sums of all periods that count
 };
 
-enum core_status results_init(struct results *self, uint32_t bin_count, core_real output_units_per_input);
+/// input_per_count, output_per_count: units of a converter's count.
+/// Errors: core_err_storage: more than results_bins_max bins
+enum core_status results_init(struct results *self, const struct frf_block_table *table, core_real input_per_count,
+                              core_real output_per_count);
 
 /// Takes the last completed period if it has not been taken yet; input and output are channels of the DFT. Returns
 /// whether it counts.

@@ -12,7 +12,7 @@ enum sample_path_channel { sample_path_torque = 0, sample_path_velocity = 1, sam
 
 /// What the drive has measured at this instant.
 struct sample_path_input {
-    struct guard_sample guard;             ///< in the guard's counts
+    struct guard_sample guard;              ///< in the guard's counts
     int16_t channels[sample_path_channels]; ///< of the converters
 };
 
@@ -27,12 +27,12 @@ struct sample_path {
     struct guard guard;
     struct msgen_player player;
     struct frf_block dft;
-    bool measuring;             ///< the last sample went into a period that counts
-    uint32_t tail_samples;      ///< that are still to be fed after the last period
-    volatile bool done;         ///< for the main loop
-    volatile uint32_t samples;  ///< since the start, for the main loop's clock
-    volatile uint32_t late;     ///< samples that took longer than a sampling period
-    uint32_t settle_periods;    ///< first whole periods that do not count
+    bool measuring;            ///< the last sample went into a period that counts
+    uint32_t tail_samples;     ///< that are still to be fed after the last period
+    volatile bool done;        ///< for the main loop
+    volatile uint32_t samples; ///< since the start, for the main loop's clock
+    volatile uint32_t late;    ///< samples that took longer than a sampling period
+    uint32_t settle_periods;   ///< first whole periods that do not count
 };
 
 /// Sets up all three; `settle_periods` of the player's periods pass before the first that counts.

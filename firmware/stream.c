@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* A recording in flash through the whole integer path, from the sampling interrupt: guard, player, the DFT in both exact
- * number formats and in blocks. Prints every integer result; no floating point anywhere. Checks itself against what the
- * host has made of the same recording (expected_stream.h). */
+/* A recording in flash through the whole integer path, from the sampling interrupt: guard, player, the DFT in both
+ * exact number formats and in blocks. Prints every integer result; no floating point anywhere. Checks itself against
+ * what the host has made of the same recording (expected_stream.h). */
 #include "firmware/board.h"
+#include "firmware/checksum.h"
 #include "firmware/expected.h"
 #include "firmware/print.h"
-#include "firmware/checksum.h"
 #include "firmware/sample_path.h"
 #include "frf/dft.h"
 
@@ -59,10 +59,10 @@ static enum core_status set_up(struct msgen_table *out_table)
                                            .storage_words = sizeof storage_block / sizeof *storage_block,
                                            .frames = block_frames,
                                            .frame_samples = sizeof block_frames / sizeof *block_frames};
-    const struct frf_dft_config q15 = {measurement_bins, q15_bins, sample_path_channels,
-                                       storage_q15,      sizeof storage_q15 / sizeof *storage_q15, 0, 0};
-    const struct frf_dft_config q31 = {measurement_bins, q31_bins, sample_path_channels,
-                                       storage_q31,      sizeof storage_q31 / sizeof *storage_q31, 0, 0};
+    const struct frf_dft_config q15 = {
+        measurement_bins, q15_bins, sample_path_channels, storage_q15, sizeof storage_q15 / sizeof *storage_q15, 0, 0};
+    const struct frf_dft_config q31 = {
+        measurement_bins, q31_bins, sample_path_channels, storage_q31, sizeof storage_q31 / sizeof *storage_q31, 0, 0};
     enum core_status status = msgen_table_open(excitation_mst, sizeof excitation_mst, out_table);
     if (status == core_ok) {
         status = frf_dft_init_q15(&exact_q15, &q15, &measurement_twiddles_q15);

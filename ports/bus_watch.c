@@ -5,8 +5,8 @@
 
 #include <math.h>
 
-const uint32_t bus_histogram_ends_us[bus_histogram_bins - 1] = {5,    10,   20,   50,    100,   200,
-                                                                500,  1000, 2000, 5000, 10000, 50000};
+const uint32_t bus_histogram_ends_us[bus_histogram_bins - 1] = {5,   10,   20,   50,   100,   200,
+                                                                500, 1000, 2000, 5000, 10000, 50000};
 
 void bus_histogram_add(struct bus_histogram *self, uint32_t value_us)
 {

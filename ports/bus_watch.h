@@ -32,10 +32,10 @@ double bus_histogram_std_us(const struct bus_histogram *self);
 uint32_t bus_histogram_quantile_us(const struct bus_histogram *self, double share);
 
 struct bus_watch {
-    uint32_t period_us;           ///< of the SYNC as planned; 0: not known, then nothing is watched
-    uint16_t reply_id;            ///< COB-ID of the last TPDO of a cycle; 0: no replies are watched
-    bool synced;                  ///< a SYNC has come, at sync_us
-    bool replied;                 ///< and has been answered
+    uint32_t period_us; ///< of the SYNC as planned; 0: not known, then nothing is watched
+    uint16_t reply_id;  ///< COB-ID of the last TPDO of a cycle; 0: no replies are watched
+    bool synced;        ///< a SYNC has come, at sync_us
+    bool replied;       ///< and has been answered
     uint64_t sync_us;
     uint32_t syncs_late;          ///< SYNCs more than half a period behind their place after the one before
     struct bus_histogram spacing; ///< |time since the SYNC before - period|

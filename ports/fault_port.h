@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/// A port that does harm: hands another port's frames on, both ways, but for those that a plan of faults hits. The faults
-/// are those of the bus inside the program (ports/inproc.h), seen from one participant: what it sends and what reaches it.
-/// What it cannot do from there: inproc_bus_error (a real bus repeats such a frame by itself).
+/// A port that does harm: hands another port's frames on, both ways, but for those that a plan of faults hits. The
+/// faults are those of the bus inside the program (ports/inproc.h), seen from one participant: what it sends and what
+/// reaches it. What it cannot do from there: inproc_bus_error (a real bus repeats such a frame by itself).
 #ifndef SERVOSCOPE_PORTS_FAULT_PORT_H
 #define SERVOSCOPE_PORTS_FAULT_PORT_H
 

@@ -39,21 +39,14 @@ static int link_status(struct modbus_port *self)
     if (code >= 1 && code < MODBUS_EXCEPTION_MAX) {
         return code;
     }
-    switch (errno) {
-    case ETIMEDOUT:
-        return modbus_link_timeout;
-    case EMBBADCRC:
-    case EMBBADDATA:
-    case EMBBADEXC:
-    case EMBUNKEXC:
-    case EMBBADSLAVE:
-        return modbus_link_damaged;
-    case EINTR:
-        return modbus_link_timeout;
-    default:
-        self->lost = true;
-        return modbus_link_lost;
+    if (code >= 0) {
+        return modbus_link_damaged; // check sum, slave, function, count, or an exception that does not exist
     }
+    if (errno == ETIMEDOUT || errno == EINTR) {
+        return modbus_link_timeout;
+    }
+    self->lost = true;
+    return modbus_link_lost;
 }
 
 /// A request on a line that has failed before would meet the rest of the last reply: settle has to come first.

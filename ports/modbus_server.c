@@ -225,8 +225,7 @@ static bool serve_bytes(struct modbus_server *self, int index, const uint8_t *by
     uint8_t reply[modbus_tcp_frame_max];
     while (size > 0) {
         uint32_t length;
-        uint32_t taken =
-            modbus_tcp_slave_take(&client->slave, may_write(self, index), bytes, size, reply, &length);
+        uint32_t taken = modbus_tcp_slave_take(&client->slave, may_write(self, index), bytes, size, reply, &length);
         if (client->slave.has_written) {
             self->commander = index;
             self->written_s = now_s();

@@ -8,9 +8,9 @@
 enum { real_time_priority = 80 }; ///< of SCHED_FIFO: above the kernel's own interrupt threads' 50
 
 struct real_time {
-    bool fifo;     ///< this thread runs before all that have no real-time priority
-    bool locked;   ///< the memory that there was at real_time_enter stays where it is
-    char text[160]; ///< one line: what was granted, and why not what was not
+    bool fifo;      ///< this thread runs before all that have no real-time priority
+    bool locked;    ///< the memory that there was at real_time_enter stays where it is
+    char text[192]; ///< one line: what was granted, and why not what was not
 };
 
 /// Asks for real time for the calling thread; what is refused is left out and said in `text`. Memory must have been

@@ -101,50 +101,34 @@ static void take_frame(struct slcan *self, const struct can_frame *frame)
     self->counters.received++;
 }
 
-/// An adapter's answer to a command, as Lawicel's gives it. What would change nothing here (filters, polling) is done.
+/// A new client begins by closing the channel: what is left over from one that went without a word is not for it.
+static void close_channel(struct slcan *self)
+{
+    if (self->pty_keeper >= 0) {
+        tcflush(self->pty_keeper, TCIFLUSH);
+    }
+    self->unsent_count = 0;
+    self->channel_open = false;
+}
+
+/// An adapter's answer to a command, as Lawicel's gives it. What would change nothing here (filters, polling) is done;
+/// there are no time stamps.
 static void obey(struct slcan *self, const char *command)
 {
-    const bool open = self->channel_open;
-    bool done = true;
-    switch (command[0]) {
-    case '\0': // clears the line
-        return;
-    case 'V':
-        say(self, "V1013\r");
-        return;
-    case 'N':
-        say(self, "NSVSC\r");
-        return;
-    case 'F':
-        say(self, "F00\r");
-        return;
-    case 'C':
-        if (self->pty_keeper >= 0) { // left over from a client that went without a word
-            tcflush(self->pty_keeper, TCIFLUSH);
+    static const struct {
+        const char *command, *answer;
+    } questions[] = {{"V", "V1013\r"}, {"N", "NSVSC\r"}, {"F", "F00\r"}, {"Z0", "\r"}, {"", ""}};
+    for (size_t i = 0; i < sizeof questions / sizeof questions[0]; i++) {
+        if (strcmp(command, questions[i].command) == 0) {
+            say(self, questions[i].answer);
+            return;
         }
-        self->unsent_count = 0;
-        self->channel_open = false;
-        break;
-    case 'O':
-    case 'L':
-        self->channel_open = true;
-        break;
-    case 'S':
-    case 's':
-        done = !open;
-        break;
-    case 'Z': // no time stamps here
-        done = strcmp(command, "Z0") == 0;
-        break;
-    case 'M':
-    case 'm':
-    case 'X':
-    case 'W':
-    case 'Q':
-        break;
-    default:
-        done = false;
     }
+    bool done = strchr("COLMmXWQ", command[0]) != NULL || (strchr("Ss", command[0]) != NULL && !self->channel_open);
+    if (command[0] == 'C') {
+        close_channel(self);
+    }
+    self->channel_open = self->channel_open || command[0] == 'O' || command[0] == 'L';
     self->counters.refused += !done;
     say(self, done ? "\r" : "\a");
 }

@@ -23,19 +23,19 @@ enum {
 /// Since the port was opened.
 struct slcan_counters {
     uint32_t sent, received;
-    uint32_t unsent;    ///< frames refused because the line did not take what was written before
-    uint32_t malformed; ///< lines that are no frame and no command
-    uint32_t extended;  ///< frames with 29-bit identifiers, not passed on
-    uint32_t refused;   ///< BEL heard from an adapter, or said as one
-    uint32_t clients;   ///< taken by an adapter
+    uint32_t unsent;      ///< frames refused because the line did not take what was written before
+    uint32_t malformed;   ///< lines that are no frame and no command
+    uint32_t extended;    ///< frames with 29-bit identifiers, not passed on
+    uint32_t refused;     ///< BEL heard from an adapter, or said as one
+    uint32_t clients;     ///< taken by an adapter
     uint32_t turned_away; ///< that came while another was there
 };
 
 /// Read-only for the application, but for `watch`, which it may start.
 struct slcan {
-    int line;         ///< connected socket, serial device or pty master; -1: nobody there
-    int listener;     ///< of an adapter on TCP, else -1
-    int pty_keeper;   ///< an adapter's own hold on its pty, so that it outlives its clients; else -1
+    int line;       ///< connected socket, serial device or pty master; -1: nobody there
+    int listener;   ///< of an adapter on TCP, else -1
+    int pty_keeper; ///< an adapter's own hold on its pty, so that it outlives its clients; else -1
     bool adapter, on_socket;
     bool channel_open;
     enum can_status status;
@@ -48,9 +48,9 @@ struct slcan {
     struct can_frame waiting[slcan_receive_max];
     size_t unsent_count;
     char unsent[slcan_unsent_bytes_max];
-    uint16_t port;      ///< of an adapter on TCP: where it listens
-    char pty_name[64];  ///< of an adapter on a pty: what a client opens
-    char link[256];     ///< to it; removed at the end; empty: none
+    uint16_t port;     ///< of an adapter on TCP: where it listens
+    char pty_name[64]; ///< of an adapter on a pty: what a client opens
+    char link[256];    ///< to it; removed at the end; empty: none
 };
 
 /// Connects to an adapter behind HOST:PORT and opens its channel at `bitrate`.

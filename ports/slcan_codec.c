@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "ports/slcan_codec.h"
 
+#include <stdbool.h>
 #include <string.h>
 
 static int hex_value(char digit)
@@ -28,38 +29,64 @@ static long hex_number(const char *text, size_t count)
     return value;
 }
 
+/// Reads the data's digits; false if one is none.
+static bool read_data(const char *digits, struct can_frame *io_frame)
+{
+    for (size_t i = 0; i < io_frame->length; i++) {
+        long byte = hex_number(&digits[2 * i], 2);
+        if (byte < 0) {
+            return false;
+        }
+        io_frame->data[i] = (uint8_t)byte;
+    }
+    return true;
+}
+
+/// What stands before the data.
+struct head {
+    bool extended, remote;
+    size_t length;      ///< of the head itself
+    size_t data_digits; ///< that follow it
+    struct can_frame frame;
+};
+
+static bool read_head(const char *line, size_t length, struct head *out)
+{
+    out->extended = line[0] == 'T' || line[0] == 'R';
+    out->remote = line[0] == 'r' || line[0] == 'R';
+    out->length = out->extended ? 10 : 5;
+    if (length < out->length) {
+        return false;
+    }
+    const long id = hex_number(&line[1], out->length - 2), count = hex_number(&line[out->length - 1], 1);
+    if (!(id >= 0 && id <= (out->extended ? 0x1FFFFFFF : can_id_max)) || !(count >= 0 && count <= can_data_max)) {
+        return false;
+    }
+    out->data_digits = out->remote ? 0 : 2 * (size_t)count;
+    out->frame = can_frame_make(out->extended ? 0 : (uint16_t)id, (uint8_t)count);
+    out->frame.remote = out->remote;
+    return true;
+}
+
 /// A line of t, r, T or R: identifier, length, data, perhaps four digits of a time stamp.
 static enum slcan_event parse_frame(const char *line, size_t length, struct can_frame *out_frame)
 {
-    const bool extended = line[0] == 'T' || line[0] == 'R', remote = line[0] == 'r' || line[0] == 'R';
-    const size_t id_digits = extended ? 8 : 3, head = 1 + id_digits + 1, stamp_digits = 4;
-    if (length < head) {
+    enum { stamp_digits = 4 };
+    struct head head;
+    if (!read_head(line, length, &head)) {
         return slcan_malformed;
     }
-    const long id = hex_number(&line[1], id_digits);
-    const int count = line[head - 1] >= '0' && line[head - 1] <= '8' ? line[head - 1] - '0' : -1;
-    const size_t digits = remote || count < 0 ? 0 : 2 * (size_t)count;
-    const size_t body = head + digits;
-    if (id < 0 || id > (extended ? 0x1FFFFFFF : can_id_max) || count < 0) {
+    const size_t body = head.length + head.data_digits;
+    if (length != body && (length != body + stamp_digits || hex_number(&line[body], stamp_digits) < 0)) {
         return slcan_malformed;
     }
-    const bool stamped = length == body + stamp_digits && hex_number(&line[body], stamp_digits) >= 0;
-    if (length != body && !stamped) {
+    if (!head.remote && !read_data(&line[head.length], &head.frame)) {
         return slcan_malformed;
     }
-    struct can_frame frame = can_frame_make(extended ? 0 : (uint16_t)id, (uint8_t)count);
-    frame.remote = remote;
-    for (size_t i = 0; i < digits / 2; i++) {
-        long byte = hex_number(&line[head + 2 * i], 2);
-        if (byte < 0) {
-            return slcan_malformed;
-        }
-        frame.data[i] = (uint8_t)byte;
-    }
-    if (extended) {
+    if (head.extended) {
         return slcan_extended;
     }
-    *out_frame = frame;
+    *out_frame = head.frame;
     return slcan_frame;
 }
 

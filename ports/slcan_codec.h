@@ -14,7 +14,7 @@
 
 enum {
     slcan_line_max = 32, ///< longest line without its CR: T, 8 digits, length, 16 digits, 4 of a time stamp, and room
-    slcan_frame_text_max = 22, ///< t, 3 digits, length, 16 digits, CR, and a terminating 0
+    slcan_frame_text_max = 23, ///< t, 3 digits, length, 16 digits, CR, and a terminating 0
     slcan_bell = 7,
 };
 

@@ -52,7 +52,8 @@ static bool open_channel(struct slcan *self, const char *name, uint32_t bitrate,
     const char rate[] = {'S', slcan_rate_digit(bitrate), '\r', '\0'};
     const char *wrong = NULL;
     if (rate[1] == '\0') {
-        snprintf(out_reason, size, "%s: %lu bit/s is none of the rates of slcan (10, 20, 50, 100, 125, 250, 500, 800 kbit/s, 1 Mbit/s)",
+        snprintf(out_reason, size,
+                 "%s: %lu bit/s is none of the rates of slcan (10, 20, 50, 100, 125, 250, 500, 800 kbit/s, 1 Mbit/s)",
                  name, (unsigned long)bitrate);
         slcan_close(self);
         return false;

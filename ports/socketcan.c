@@ -85,8 +85,8 @@ static bool translate(const struct kernel_can_frame *raw, struct can_frame *out_
 /// Room for one call to the kernel: frames, and what comes beside each.
 struct batch {
     struct kernel_can_frame frames[socketcan_batch_max];
-    _Alignas(struct cmsghdr)
-        char controls[socketcan_batch_max][CMSG_SPACE(sizeof(struct timespec)) + CMSG_SPACE(sizeof(uint32_t))];
+    _Alignas(struct cmsghdr) char controls[socketcan_batch_max]
+                                          [CMSG_SPACE(sizeof(struct timespec)) + CMSG_SPACE(sizeof(uint32_t))];
     struct iovec parts[socketcan_batch_max];
     struct mmsghdr messages[socketcan_batch_max];
 };
@@ -211,8 +211,8 @@ struct can_port socketcan_port(struct socketcan *self)
 
 static bool set_filters(struct socketcan *self, uint8_t node_id)
 {
-    // 11-bit identifiers only; of one node what it sends: EMCY, TPDOs and SDO answers have bit 7 set in CANopen, what it
-    // is sent has not.
+    // 11-bit identifiers only; of one node what it sends: EMCY, TPDOs and SDO answers have bit 7 set in CANopen, what
+    // it is sent has not.
     const struct can_filter of_all[] = {{.can_id = 0, .can_mask = CAN_EFF_FLAG}};
     const struct can_filter of_node[] = {
         {.can_id = 0x080u | node_id, .can_mask = 0x080 | 0x07F | CAN_EFF_FLAG},
@@ -250,13 +250,12 @@ static bool bind_interface(struct socketcan *self, const char *interface, char *
     address.can_family = AF_CAN;
     address.can_ifindex = request.ifr_ifindex;
     if (bind(self->socket, (struct sockaddr *)&address, sizeof address) != 0) {
-        snprintf(out_reason, size, "%s: %s", interface,
-                 errno == ENODEV ? "is no CAN interface" : strerror(errno));
+        snprintf(out_reason, size, "%s: %s", interface, errno == ENODEV ? "is no CAN interface" : strerror(errno));
         return false;
     }
     if (ioctl(self->socket, SIOCGIFFLAGS, &request) != 0 || !(request.ifr_flags & IFF_UP)) {
-        snprintf(out_reason, size, "%s: is down; expected 'ip link set %s up type can bitrate 1000000' before", interface,
-                 interface);
+        snprintf(out_reason, size, "%s: is down; expected 'ip link set %s up type can bitrate 1000000' before",
+                 interface, interface);
         return false;
     }
     return true;
@@ -268,8 +267,8 @@ bool socketcan_open(struct socketcan *self, const char *interface, uint8_t node_
     wall_clock_start(&self->clock);
     self->socket = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
     if (self->socket < 0) {
-        snprintf(out_reason, size, "%s: this kernel has no CAN sockets (%s); 'modprobe can_raw' may bring them", interface,
-                 strerror(errno));
+        snprintf(out_reason, size, "%s: this kernel has no CAN sockets (%s); 'modprobe can_raw' may bring them",
+                 interface, strerror(errno));
         return false;
     }
     bool done = bind_interface(self, interface, out_reason, size);

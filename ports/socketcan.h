@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /// A CAN interface of this machine (can0, vcan0, ...) through Linux' raw sockets, as a struct can_port.
-/// Only frames with 11-bit identifiers pass. The watch sees each with the kernel's time stamp. A port that listens to one
-/// node gets its own SYNC back when it has left, for the watch alone: that is when it really went out.
+/// Only frames with 11-bit identifiers pass. The watch sees each with the kernel's time stamp. A port that listens to
+/// one node gets its own SYNC back when it has left, for the watch alone: that is when it really went out.
 #ifndef SERVOSCOPE_PORTS_SOCKETCAN_H
 #define SERVOSCOPE_PORTS_SOCKETCAN_H
 

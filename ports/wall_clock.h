@@ -24,9 +24,9 @@ uint64_t wall_clock_us(const struct wall_clock *self);
 /// `now_us` is this clock's time; the result is never later.
 uint64_t wall_clock_of_stamp_us(struct wall_clock *self, uint64_t now_us, int64_t seconds, int64_t nanoseconds);
 
-/// Waits until one of the files has an event that is asked for, or has failed, or until the time is `until_us`, whichever
-/// is first; none at all: for the time alone. A signal ends the wait early. Writes `revents`; returns how many files have
-/// events.
+/// Waits until one of the files has an event that is asked for, or has failed, or until the time is `until_us`,
+/// whichever is first; none at all: for the time alone. A signal ends the wait early. Writes `revents`; returns how
+/// many files have events.
 /// Each call computes what is left from the absolute time: early returns do not add up.
 int wall_clock_wait(const struct wall_clock *self, struct pollfd *files, size_t count, uint64_t until_us);
 

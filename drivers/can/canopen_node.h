@@ -2,8 +2,8 @@
 /// The communication half of a CANopen node (CiA 301): NMT, heartbeats, SYNC, EMCY, SDO server, PDOs, over an object
 /// dictionary whose application part is somebody else's. No clock: times are arguments; no waiting.
 /// Objects: 1000, 1001, 1003, 1005 (80h only), 1006, 1007, 1008, 1009, 100A, 1014, 1016, 1017, 1018, 1019, 1029, 1200,
-/// 1400..1403, 1600..1603, 1800..1803, 1A00..1A03, 2001, 2002 (pdo_check.h). There is nothing to store, so 1010 and 1011
-/// do not exist.
+/// 1400..1403, 1600..1603, 1800..1803, 1A00..1A03, 2001, 2002 (pdo_check.h). There is nothing to store, so 1010 and
+/// 1011 do not exist.
 /// On a SYNC it takes the set-points received before it, lets the application sample and control, and sends the TPDOs.
 #ifndef SERVOSCOPE_DRIVERS_CAN_CANOPEN_NODE_H
 #define SERVOSCOPE_DRIVERS_CAN_CANOPEN_NODE_H

@@ -320,14 +320,13 @@ static uint32_t continue_transfer(struct sdo_server *self, const struct can_fram
     }
 }
 
-static void make_abort(struct sdo_server *self, uint16_t index, uint8_t subindex, uint32_t abort_code,
-                       struct can_frame *out_frame)
+static void make_abort(struct sdo_server *self, uint32_t abort_code, struct can_frame *out_frame)
 {
     self->state = sdo_server_idle;
     *out_frame = can_frame_make((uint16_t)(sdo_response_cob_id + self->node_id), 8);
     out_frame->data[0] = answer_abort;
-    can_put(&out_frame->data[1], 2, index);
-    out_frame->data[3] = subindex;
+    can_put(&out_frame->data[1], 2, self->index);
+    out_frame->data[3] = self->subindex;
     can_put(&out_frame->data[4], 4, abort_code);
 }
 
@@ -353,6 +352,36 @@ static uint32_t take_block_segment(struct sdo_server *self, const struct can_fra
     return abort_code;
 }
 
+/// Whether a frame ends the transfer, or looks like it and is to be passed over: behind a block's last segment, what
+/// looks like an abort may be that segment once more.
+static bool take_abort(struct sdo_server *self, uint8_t command)
+{
+    const uint8_t exact = request_abort << 5;
+    if (self->state == sdo_server_block_download ? command != exact : command >> 5 != request_abort)
+        return false;
+    if (command == exact || self->state != sdo_server_block_download_end)
+        self->state = sdo_server_idle;
+    return true;
+}
+
+/// Serves a frame that is no abort; returns an abort code.
+static uint32_t serve_frame(struct sdo_server *self, const struct can_frame *frame, struct can_frame *out_answer,
+                            bool *out_answers)
+{
+    uint8_t command = frame->data[0];
+    if (self->state == sdo_server_block_download)
+        return take_block_segment(self, frame, out_answer, out_answers);
+    if (self->state == sdo_server_block_download_end && (command & 0xE3) == 0xC1)
+        return end_block_download(self, frame, out_answer);
+    if (starts_transfer(command))
+        return start_transfer(self, frame, out_answer);
+    if (self->state == sdo_server_idle) { // belongs to no transfer: its own bytes name the object in the answer
+        self->index = request_index(frame);
+        self->subindex = frame->data[3];
+    }
+    return continue_transfer(self, frame, out_answer, out_answers);
+}
+
 bool sdo_server_take(struct sdo_server *self, const struct can_frame *frame, uint64_t now_us,
                      struct can_frame *out_answer)
 {
@@ -362,37 +391,18 @@ bool sdo_server_take(struct sdo_server *self, const struct can_frame *frame, uin
         self->malformed++;
         return false;
     }
-    uint8_t command = frame->data[0];
-    bool in_block = self->state == sdo_server_block_download;
-    if (command == (request_abort << 5) || (!in_block && command >> 5 == request_abort)) {
-        // What looks like an abort behind a block's last segment is that segment once more.
-        if (command == (request_abort << 5) || self->state != sdo_server_block_download_end)
-            self->state = sdo_server_idle;
+    if (take_abort(self, frame->data[0]))
         return false;
-    }
     self->last_us = now_us;
     self->reminded = false;
     *out_answer = can_frame_make((uint16_t)(sdo_response_cob_id + self->node_id), 8);
-    bool busy = self->state != sdo_server_idle, answers = true;
-    uint16_t index = busy ? self->index : request_index(frame);
-    uint8_t subindex = busy ? self->subindex : frame->data[3];
-    uint32_t abort_code = od_abort_none;
-    if (in_block) {
-        abort_code = take_block_segment(self, frame, out_answer, &answers);
-    } else if (self->state == sdo_server_block_download_end && (command & 0xE3) == 0xC1) {
-        abort_code = end_block_download(self, frame, out_answer);
-    } else if (starts_transfer(command)) {
-        abort_code = start_transfer(self, frame, out_answer);
-        index = self->index;
-        subindex = self->subindex;
-    } else {
-        abort_code = continue_transfer(self, frame, out_answer, &answers);
-    }
-    if (abort_code != od_abort_none) {
-        self->aborts++;
-        make_abort(self, index, subindex, abort_code, out_answer);
-    }
-    return abort_code != od_abort_none || answers;
+    bool answers = true;
+    uint32_t abort_code = serve_frame(self, frame, out_answer, &answers);
+    if (abort_code == od_abort_none)
+        return answers;
+    self->aborts++;
+    make_abort(self, abort_code, out_answer);
+    return true;
 }
 
 bool sdo_server_upcoming(const struct sdo_server *self, struct can_frame *out_frame)
@@ -432,6 +442,6 @@ bool sdo_server_advance(struct sdo_server *self, uint64_t now_us, struct can_fra
         return true;
     }
     self->timeouts++;
-    make_abort(self, self->index, self->subindex, od_abort_timeout, out_frame);
+    make_abort(self, od_abort_timeout, out_frame);
     return true;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /// SDO server (CiA 301): expedited, segmented and block transfers, both ways, one at a time. No clock: times are
-/// arguments. What takes more than one frame to answer (the segments of a block upload) is asked for one by one, so that
-/// its owner decides how fast they go out.
+/// arguments. What takes more than one frame to answer (the segments of a block upload) is asked for one by one, so
+/// that its owner decides how fast they go out.
 /// A request that starts a transfer ends one that was under way; so do an abort, an error and sdo_server_timeout_us
 /// without a frame from the client.
 #ifndef SERVOSCOPE_DRIVERS_CAN_SDO_SERVER_H

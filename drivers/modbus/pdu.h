@@ -19,7 +19,7 @@ enum modbus_function {
 /// may_write: false answers everything that writes with exception 06: somebody else commands
 /// Range:     any bytes; reads request[0 .. size-1], writes at most modbus_pdu_max bytes to out_reply
 /// Returns:   length of the reply, 0 for a request of no bytes
-/// Test:      tests/unit/test_modbus_pdu.c
+/// Test:      tests/unit/test_modbus_slave.c
 uint32_t modbus_pdu_answer(struct modbus_map *map, bool may_write, const uint8_t *request, uint32_t size,
                            uint8_t *out_reply);
 

@@ -82,7 +82,7 @@ extern const double table_player_quick_stop_s;
 extern const double table_player_rest_s;
 
 /// At rest, without a table. Errors: core_err_argument
-/// Test: tests/unit/test_table_player.c
+/// Test: tests/api/test_modbus_drive.c
 enum core_status table_player_init(struct table_player *self, const struct table_player_storage *storage);
 
 /// What a register map calls.

@@ -36,7 +36,7 @@ static double hat(double u, size_t knot, size_t count)
 }
 
 /// Speeds are dense near zero, so knots are: u = sqrt(|v| / peak).
-static double speed_function(const struct recording *r, double v, size_t index)
+static double speed_function(double peak, double v, size_t index)
 {
     if (index == 2 * speed_knots)
         return v; // the knots are no straight line, and this function is one that models have
@@ -45,13 +45,8 @@ static double speed_function(const struct recording *r, double v, size_t index)
     bool negative = index >= speed_knots;
     if ((v < 0.0) != negative)
         return 0.0;
-    double u = sqrt(fmin(fabs(v) / r->coverage.velocity_peak, 1.0));
+    double u = sqrt(fmin(fabs(v) / peak, 1.0));
     return hat(u, index % speed_knots, speed_knots);
-}
-
-static double position_function(const struct recording *r, double low, double x, size_t index, size_t knots)
-{
-    return hat((x - low) / r->coverage.position_span, index, knots);
 }
 
 static const double *driving_signal(const struct recording *r)
@@ -67,12 +62,38 @@ static size_t back(const struct recording *r, size_t n, size_t steps)
     return r->periodic ? n + samples - steps : 0;
 }
 
+struct builder {
+    const struct recording *r;
+    double low, span, peak; ///< of position and speed: where the knots are
+    double torque_rms;
+    size_t knots; ///< of functions of position
+};
+
+static struct builder builder_on(const struct recording *r, size_t knots)
+{
+    struct builder b = {.r = r,
+                        .low = r->block.position[0],
+                        .span = r->coverage.position_span,
+                        .peak = r->coverage.velocity_peak,
+                        .torque_rms = r->coverage.torque_rms,
+                        .knots = knots};
+    for (size_t n = 0; n < r->block.samples; n++)
+        b.low = fmin(b.low, r->block.position[n]);
+    return b;
+}
+
+static double position_function(const struct builder *b, double x, size_t index, size_t knots)
+{
+    return hat((x - b->low) / b->span, index, knots);
+}
+
 /// Filter regressor number `index` at sample n: taps of the torque, taps of the change of speed, on either channel.
-static void filter_function(const struct recording *r, size_t n, size_t index, double *out_mechanics,
+static void filter_function(const struct builder *b, size_t n, size_t index, double *out_mechanics,
                             double *out_actuator)
 {
+    const struct recording *r = b->r;
     const double *u = driving_signal(r);
-    double torque = u[n], scale = 1.0 / r->coverage.torque_rms;
+    double torque = u[n], scale = 1.0 / b->torque_rms;
     *out_mechanics = *out_actuator = 0.0;
     if (r->block.still && index < group_sizes[blackbox_filter] - 1)
         return; // what is to be explained is the torque itself
@@ -88,12 +109,6 @@ static void filter_function(const struct recording *r, size_t n, size_t index, d
         *out_mechanics = r->block.position[n];
 }
 
-struct builder {
-    const struct recording *r;
-    double low;
-    size_t knots; ///< of functions of position
-};
-
 static void regressor(const struct builder *b, enum blackbox_group group, size_t index, size_t n, double *out_mechanics,
                       double *out_actuator)
 {
@@ -104,33 +119,33 @@ static void regressor(const struct builder *b, enum blackbox_group group, size_t
     *out_actuator = 0.0;
     switch (group) {
     case blackbox_speed:
-        *out_mechanics = speed_function(r, v, index);
+        *out_mechanics = speed_function(b->peak, v, index);
         break;
     case blackbox_position:
-        *out_mechanics = position_function(r, b->low, x, index, b->knots);
+        *out_mechanics = position_function(b, x, index, b->knots);
         break;
     case blackbox_direction:
-        *out_mechanics = (v > 0.0 ? 1.0 : -1.0) * position_function(r, b->low, x, index, direction_knots);
+        *out_mechanics = (v > 0.0 ? 1.0 : -1.0) * position_function(b, x, index, direction_knots);
         break;
     case blackbox_filter:
     case blackbox_groups:
-        filter_function(r, n, index, out_mechanics, out_actuator);
+        filter_function(b, n, index, out_mechanics, out_actuator);
         break;
     }
 }
 
-static bool build_run(const struct blackbox *self, const struct evidence *evidence, size_t values, size_t offset)
+/// like: the recording whose range the knots divide; NULL: its own.
+static bool build_run(const struct blackbox *self, const struct evidence *evidence, const struct recording *like,
+                      size_t values, size_t offset)
 {
     const struct recording *r = evidence->recording;
     size_t samples = r->block.samples;
     double *signal = malloc(2 * samples * sizeof *signal);
     if (!signal)
         return false;
-    struct builder b = {.r = r,
-                        .low = r->block.position[0],
-                        .knots = self->group_begin[blackbox_position + 1] - self->group_begin[blackbox_position]};
-    for (size_t n = 0; n < samples; n++)
-        b.low = fmin(b.low, r->block.position[n]);
+    struct builder b =
+        builder_on(like ? like : r, self->group_begin[blackbox_position + 1] - self->group_begin[blackbox_position]);
+    b.r = r;
     for (int group = 0; group < blackbox_groups; group++)
         for (size_t i = 0; self->group_begin[group] + i < self->group_begin[group + 1]; i++) {
             for (size_t n = 0; n < samples; n++)
@@ -142,7 +157,7 @@ static bool build_run(const struct blackbox *self, const struct evidence *eviden
     return true;
 }
 
-bool blackbox_init(struct blackbox *self, const struct fit_data *data)
+static bool init_like(struct blackbox *self, const struct fit_data *data, const struct recording *like)
 {
     memset(self, 0, sizeof *self);
     bool still = data->runs > 0 && data->evidence[0].recording->block.still;
@@ -156,13 +171,18 @@ bool blackbox_init(struct blackbox *self, const struct fit_data *data)
     self->matrix = malloc(self->columns * data->values * sizeof(double));
     size_t offset = 0;
     for (size_t i = 0; self->matrix && i < data->runs; i++) {
-        if (!build_run(self, &data->evidence[i], data->values, offset)) {
+        if (!build_run(self, &data->evidence[i], like, data->values, offset)) {
             blackbox_free(self);
             return false;
         }
         offset += data->evidence[i].values;
     }
     return self->matrix != NULL;
+}
+
+bool blackbox_init(struct blackbox *self, const struct fit_data *data)
+{
+    return init_like(self, data, NULL);
 }
 
 void blackbox_free(struct blackbox *self)
@@ -229,4 +249,46 @@ double blackbox_gain(const struct blackbox *self, const struct fit_data *data, c
     if (out_cost)
         *out_cost = cost;
     return 0.5 * (fit->cost - cost);
+}
+
+/// Coefficients of all functions from what a fit leaves. Errors: false if memory is short or they cannot be solved for.
+static bool learn(const struct blackbox *self, size_t rows, const double *residual, double *out_x)
+{
+    size_t most = self->columns, m = 0;
+    double *A = calloc(rows * most + rows + 2 * most, sizeof *A);
+    if (!A)
+        return false;
+    double *b = A + rows * most, *weight = b + rows, *centre = weight + most;
+    for (int group = 0; group < blackbox_groups; group++)
+        m = take_group(self, rows, group, m, A, weight);
+    for (size_t j = 0; j < rows; j++)
+        b[j] = -residual[j];
+    bool good = isfinite(solve_rest(rows, m, A, weight, centre, out_x, b));
+    free(A);
+    return good;
+}
+
+double blackbox_ceiling(const struct fit_data *data, const double *residual, const struct fit_data *unseen,
+                        double *io_unseen)
+{
+    struct blackbox known, strange;
+    const struct recording *like = data->evidence[0].recording;
+    double sum = NAN;
+    if (!init_like(&known, data, like))
+        return sum;
+    double *x = calloc(known.columns, sizeof *x);
+    bool good = x && learn(&known, data->values, residual, x) && init_like(&strange, unseen, like);
+    if (good && strange.columns == known.columns) {
+        sum = 0.0;
+        for (size_t j = 0; j < unseen->values; j++) {
+            for (size_t i = 0; i < strange.columns; i++)
+                io_unseen[j] += strange.matrix[i * unseen->values + j] * x[i];
+            sum += io_unseen[j] * io_unseen[j];
+        }
+    }
+    if (good)
+        blackbox_free(&strange);
+    free(x);
+    blackbox_free(&known);
+    return sqrt(sum / (double)unseen->values);
 }

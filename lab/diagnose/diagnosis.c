@@ -28,7 +28,7 @@ struct work {
     size_t held_from;    ///< row at which the part begins that is held back
     struct fit fit;
     struct search_memo memo; ///< of fit_data
-    struct repeat repeat; ///< of the fit's parameters, on the validation data
+    struct repeat repeat;    ///< of the fit's parameters, on the validation data
 };
 
 static void work_free(struct work *w)
@@ -656,6 +656,19 @@ static bool refuse_distance(const struct work *w, const struct diagnosis *d, str
     return true;
 }
 
+/// What a black box that learned on the fit runs leaves of the validation runs; NaN if memory is short.
+static double ceiling_rms(const struct work *w, const struct sim_model *extended)
+{
+    const struct fit_data *unseen = &w->validate_data;
+    double *left = malloc((unseen->values + unseen->contrasts) * sizeof *left), rms = NAN;
+    if (left) {
+        fit_residual(unseen, extended, left);
+        rms = blackbox_ceiling(&w->fit_data, w->fit.residual, unseen, left);
+    }
+    free(left);
+    return rms;
+}
+
 /// Share of the given model's squared excess over one (whitened) or over the noise floor that stays.
 static double share_left(double given, double left, double floor)
 {
@@ -672,6 +685,7 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     d->refitted = validate_figures(&w->validate_data, &d->refitted_model);
     d->extended = validate_figures(&w->validate_data, &d->extended_model);
     d->mean_rms_chance = validate_mean_rms_chance(&w->validate_data);
+    d->black_box_rms = ceiling_rms(w, &d->extended_model);
     d->noise_floor_nrmse = validate_noise_floor(&w->validate_data, &d->extended_model);
     struct judgement judgement;
     // An effect that cannot show in the validation data changes nothing there; one that spoils it is a wrong name.

@@ -79,9 +79,11 @@ struct diagnosis {
     struct diagnosis_untestable untestable[sim_effects_max];
     struct diagnosis_figures nominal, refitted, extended;
     double noise_floor_nrmse;
-    double mean_rms_chance;   ///< what the noise lets a perfect model's mean_rms exceed once in twenty
-    double fit_misfit;        ///< mean squared whitened residual of the extended model on the fit runs, 1 is perfect
-    char where[300];          ///< unexplained: in words, empty otherwise
+    double black_box_rms;   ///< mean_rms of the extended model with a black box that learned on the fit runs: where
+                            ///< that is not below extended.mean_rms, no function of speed and position is left to find
+    double mean_rms_chance; ///< what the noise lets a perfect model's mean_rms exceed once in twenty
+    double fit_misfit;      ///< mean squared whitened residual of the extended model on the fit runs, 1 is perfect
+    char where[300];        ///< unexplained: in words, empty otherwise
     double unexplained_share; ///< of the nominal model's misfit, 0..1
     struct diagnosis_curves curves;
 };

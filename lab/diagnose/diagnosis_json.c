@@ -160,7 +160,8 @@ cJSON *diagnosis_json(const struct diagnosis *self)
               add_untestable(root, self) && add_figures(root, "nominal", &self->nominal) &&
               add_figures(root, "refitted", &self->refitted) && add_figures(root, "extended", &self->extended) &&
               add_number(root, "noise_floor_nrmse", self->noise_floor_nrmse) &&
-              add_number(root, "mean_rms_chance", self->mean_rms_chance) && add_unexplained(root, self) &&
+              add_number(root, "mean_rms_chance", self->mean_rms_chance) &&
+              add_number(root, "black_box_rms", self->black_box_rms) && add_unexplained(root, self) &&
               add_context(root, self);
     if (!ok) {
         cJSON_Delete(root);

@@ -309,14 +309,16 @@ static enum blackbox_group one_gap(const struct blackbox *box, const struct fit_
 /// black box leaves of it on return.
 static void judge_mean(const struct bench *b, double validation_rms, bool worse, double *io_rest, struct judgement *j)
 {
-    const double half_again = 1.5, visible = 1.12; // a third of the noise, in amplitude
-    const double seen_again = 1.03;                // on data the fit has not seen: chance does not come twice
+    // Beside a given model a right answer leaves noise. Without one, half as much again is what a machine is like.
+    const double too_much = b->hypothesis->inertia_free ? 1.5 : 1.25,
+                 visible = 1.12;    // a third of the noise's amplitude
+    const double seen_again = 1.03; // on data the fit has not seen: chance does not come twice
     double left, values = (double)b->data->values, columns = (double)b->box->columns;
     j->leftover = blackbox_gain(b->box, b->data, b->hypothesis, b->fit, blackbox_all, &left, io_rest);
     double chance = 0.5 * columns + 12.0 * sqrt(0.5 * columns);
     bool structured = j->leftover / fmax(left / values, 1.0) > chance && b->fit->cost > visible * left;
     j->unexplained = worse || (structured && !(validation_rms < seen_again)) ||
-                     b->fit->cost / values > half_again * half_again || !(validation_rms < half_again);
+                     b->fit->cost / values > too_much * too_much || !(validation_rms < too_much);
     j->of_mean = j->unexplained;
     if (j->unexplained) {
         describe_rest(b->box, b->data, b->hypothesis, b->fit, j->where, sizeof j->where);

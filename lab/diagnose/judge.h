@@ -19,7 +19,7 @@ struct judgement {
 
 /// What data that the fit has not seen say of the extended model.
 struct judge_validation {
-    double mean_rms; ///< diagnosis_figures
+    double mean_rms;            ///< diagnosis_figures
     bool worse;                 ///< it errs more there than the refitted model
     struct structure over_time; ///< that it leaves there
 };
@@ -27,7 +27,8 @@ struct judge_validation {
 /// Judges a finished search.
 /// Unexplained: the black box gains more than chance allows (its expected gain plus twelve standard deviations) and
 /// more than a third of the noise in amplitude, or one group of it does as well as three names, or the residual on fit
-/// or validation data is half again as large as the noise, or periods differ beyond chance.
+/// or validation data is a quarter larger than the noise (half as large again without a given model), or periods differ
+/// beyond chance.
 /// A name stands if it explains a visible share of the torque and, where something stays unexplained, far more than
 /// what stays and more than the black box can do without it.
 /// Errors: false if memory is short.

@@ -18,7 +18,8 @@ bool eds_write(FILE *file, const struct canopen_node *node);
 
 enum { eds_name_max = 64 };
 
-/// What an object and its entries are called in CiA 301 and 402; others "Object 2345". `out_text` has eds_name_max bytes.
+/// What an object and its entries are called in CiA 301 and 402; others "Object 2345". `out_text` has eds_name_max
+/// bytes.
 void eds_object_name(uint16_t index, char *out_text);
 void eds_entry_name(uint16_t index, uint8_t subindex, char *out_text);
 

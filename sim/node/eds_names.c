@@ -30,6 +30,8 @@ static const struct name objects[] = {
     {0x2000, 0x2000, "Counters of the drive"},
     {0x2001, 0x2001, "Check of samples"},
     {0x2002, 0x2002, "Check of set-points"},
+    {0x2003, 0x2003, "SYNC time-out"},
+    {0x2004, 0x2004, "Blocked motor"},
     {0x6007, 0x6007, "Abort connection option code"},
     {0x603F, 0x603F, "Error code"},
     {0x6040, 0x6040, "Controlword"},

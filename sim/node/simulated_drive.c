@@ -209,23 +209,34 @@ static bool is_streamed(const struct simulated_drive *self, uint16_t index)
     return false;
 }
 
+/// What anybody may write to a drive that somebody else commands: a stop, and the mode, which has a rule of its own
+/// (only while no set-point is followed).
+static bool is_free_to_all(const struct can_frame *download)
+{
+    uint32_t index = can_get(&download->data[1], 2);
+    if (index == cia402_modes_of_operation)
+        return true;
+    bool expedited = download->data[0] >> 5 == 1 && (download->data[0] & 0x02) != 0;
+    if (index != cia402_control_word || download->data[3] != 0 || !expedited)
+        return false;
+    enum cia402_event event = cia402_control_decode((uint16_t)can_get(&download->data[4], 2));
+    return event == cia402_quick_stop || event == cia402_disable_voltage;
+}
+
+static bool is_download(const struct simulated_drive *self, const struct can_frame *frame)
+{
+    unsigned specifier = frame->data[0] >> 5;
+    return frame->id == 0x600u + self->node.node_id && !frame->remote && frame->length == 8 &&
+           (specifier == 1 || specifier == 6);
+}
+
 /// SDO does not say who asks. While somebody streams control words to a drive under torque, a download can only be
-/// somebody else's: then all that it may do is stop.
+/// somebody else's.
 static bool refuse_second_commander(struct simulated_drive *self, const struct can_frame *frame)
 {
-    if (frame->id != 0x600u + self->node.node_id || frame->remote || frame->length < 8)
+    bool commanded = cia402_machine_is_powered(&self->machine) && is_streamed(self, cia402_control_word);
+    if (!commanded || !is_download(self, frame) || is_free_to_all(frame))
         return false;
-    unsigned specifier = frame->data[0] >> 5;
-    bool download = specifier == 1 || specifier == 6;
-    if (!download || !cia402_machine_is_powered(&self->machine) || !is_streamed(self, cia402_control_word))
-        return false;
-    bool is_control_word = can_get(&frame->data[1], 2) == cia402_control_word && frame->data[3] == 0;
-    bool expedited = specifier == 1 && (frame->data[0] & 0x02) != 0;
-    if (is_control_word && expedited) {
-        enum cia402_event event = cia402_control_decode((uint16_t)can_get(&frame->data[4], 2));
-        if (event == cia402_quick_stop || event == cia402_disable_voltage)
-            return false;
-    }
     struct can_frame answer = can_frame_make((uint16_t)(0x580 + self->node.node_id), 8);
     answer.data[0] = 0x80;
     memcpy(&answer.data[1], &frame->data[1], 3);

@@ -57,8 +57,14 @@ static uint32_t write_mode(void *owner, const struct od_entry *entry, int64_t va
     bool known = value == 0 || (value > 0 && value <= 32 && (self->objects.supported_modes & CIA402_SUPPORTS(value)));
     if (!known)
         return od_abort_value;
-    if (cia402_machine_is_powered(&self->machine) && value != self->objects.mode)
-        return od_abort_state; // a change under torque would be a step
+    bool changes = value != self->objects.mode;
+    if (changes && cia402_machine_is_powered(&self->machine)) {
+        // Halted, or in no mode yet, and at rest: some clients change it there. Elsewhere it would be a step.
+        bool resting = self->command.control == sim_control_stop && self->stood_still;
+        if (!resting || self->machine.state != cia402_operation_enabled)
+            return od_abort_state;
+        forget_setpoints(self);
+    }
     od_store(owner, entry, value);
     self->objects.mode_display = (int8_t)value;
     return od_abort_none;

@@ -302,6 +302,80 @@ static void test_can_drive_stop_is_a_ramp_and_harmless_twice(void)
     bench.drive.operations->close(bench.drive.self);
 }
 
+/// A second master on the same bus while the first one measures.
+static void test_can_drive_second_master_is_refused_and_the_first_undisturbed(void)
+{
+    const struct drive_configuration configuration = can_bench_configuration(drive_mode_cascade);
+    open_and_arm(&configuration);
+    struct can_port port;
+    struct cia402_master second;
+    struct cia402_master_options options = cia402_master_defaults();
+    options.master_id = 126;
+    TEST_ASSERT_TRUE(inproc_bus_add_port(&bench.bus, &port) >= 0);
+    cia402_master_init(&second, &port, &options);
+    struct drive door = cia402_master_drive(&second);
+    // While it asks nobody sends SYNC here: the drive is made patient for that.
+    bench.node.node.sync.timeout_us = 1000000;
+    TEST_ASSERT_EQUAL(drive_err_refused, door.operations->open(door.self, &configuration));
+    TEST_ASSERT_EQUAL_STRING("node 5 is in operation enabled already and watches the heartbeat of node 127: another "
+                             "master commands it",
+                             door.operations->detail(door.self));
+    TEST_ASSERT_EQUAL(drive_err_argument, door.operations->arm(door.self));
+    door.operations->close(door.self);
+    struct drive_setpoint setpoint = sine(0);
+    struct drive_sample sample;
+    ok(bench.drive.operations->exchange(bench.drive.self, &setpoint, &sample));
+    TEST_ASSERT_TRUE(sample.valid);
+    // What it writes by SDO all the same is not obeyed, but for a stop.
+    canopen_master_init(&second.bus, &port, 5, 126, 50000);
+    TEST_ASSERT_EQUAL_HEX32(od_abort_state, canopen_master_write(&second.bus, cia402_max_torque, 0, 2, 60000));
+    TEST_ASSERT_EQUAL_HEX32(od_abort_state, canopen_master_write(&second.bus, 0x1016, 1, 4, 126u << 16 | 100));
+    TEST_ASSERT_EQUAL_HEX32(od_abort_none,
+                            canopen_master_write(&second.bus, cia402_control_word, 0, 2, cia402_control_quick_stop));
+    TEST_ASSERT_EQUAL(drive_err_fault, bench.drive.operations->exchange(bench.drive.self, &setpoint, &sample));
+}
+
+static void test_can_drive_profile_is_the_drives_own_or_refused(void)
+{
+    struct drive_configuration configuration = can_bench_configuration(drive_mode_cascade);
+    ok(bench.drive.operations->open(bench.drive.self, &configuration));
+    TEST_ASSERT_EQUAL_STRING("servoscope", bench.master.profile->name);
+    bench.drive.operations->close(bench.drive.self);
+    bench.master.options.profile = cia402_profile_find("delta_asda_a2");
+    refused(drive_err_identity, &configuration, "vendor (1018:1) is 00000000, profile delta_asda_a2 is for Delta");
+    bench.node.node.identity.vendor = 0x1DD;
+    configuration.sample_rate_hz = 1250.0;
+    refused(drive_err_argument, &configuration, "1 / 1250 Hz = 800 us; object 60C2 of Delta ASDA-A2 takes 1..20 x");
+    configuration.sample_rate_hz = 500.0;
+    ok(bench.drive.operations->open(bench.drive.self, &configuration));
+    TEST_ASSERT_EQUAL_UINT8(2, bench.node.objects.period_units);
+    TEST_ASSERT_EQUAL_INT8(-3, bench.node.objects.period_exponent);
+    bench.drive.operations->close(bench.drive.self);
+    bench.master.options.profile = NULL; // by identity
+    configuration.sample_rate_hz = 1250.0;
+    refused(drive_err_argument, &configuration, "Delta ASDA-A2");
+}
+
+static void test_can_drive_longer_sync_time_out_reaches_the_drive(void)
+{
+    const struct drive_configuration configuration = can_bench_configuration(drive_mode_cascade);
+    bench.master.options.sync_timeout_us = 50000;
+    open_and_arm(&configuration);
+    TEST_ASSERT_EQUAL_UINT32(50000, bench.node.node.sync.timeout_us);
+    TEST_ASSERT_EQUAL_UINT32(1000, bench.node.node.sync.period_us);
+    inproc_bus_run(&bench.bus, bench.bus.now_ns / 1000 + 20000); // the program was held up
+    struct drive_setpoint still = {0};
+    struct drive_sample sample;
+    uint32_t late = bench.drive.operations->counters(bench.drive.self)->samples_late;
+    ok(bench.drive.operations->exchange(bench.drive.self, &still, &sample));
+    TEST_ASSERT_EQUAL_UINT32(late + 1, bench.drive.operations->counters(bench.drive.self)->samples_late);
+    bench.drive.operations->close(bench.drive.self);
+    // A drive without an object for it is told by 1006 alone.
+    bench.master.options.profile = &cia402_profile_generic;
+    ok(bench.drive.operations->open(bench.drive.self, &configuration));
+    TEST_ASSERT_EQUAL_UINT32(33332, bench.node.node.sync.period_us);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -317,5 +391,8 @@ int main(void)
     RUN_TEST(test_can_drive_following_error_faults_and_says_so);
     RUN_TEST(test_can_drive_set_points_saturate_and_count);
     RUN_TEST(test_can_drive_stop_is_a_ramp_and_harmless_twice);
+    RUN_TEST(test_can_drive_second_master_is_refused_and_the_first_undisturbed);
+    RUN_TEST(test_can_drive_profile_is_the_drives_own_or_refused);
+    RUN_TEST(test_can_drive_longer_sync_time_out_reaches_the_drive);
     return UNITY_END();
 }

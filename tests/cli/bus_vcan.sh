@@ -129,34 +129,56 @@ grep -q '^5 frames received' drive.txt || fail "what the drive counts: $(cat dri
 
 # ---- The master dies
 
-start_drive --can vcan0
-"$SERVOSCOPE" measure --drive "can:vcan0?node=5&$patience" --table table.mst --periods 1000 --out killed.csv --quiet &
-master=$!
-for _ in {1..100}; do # until SYNCs have come for a while
-    [ "$(grep -c ' 080#' dump.txt)" -lt 600 ] || break
-    sleep 0.1
-done
-kill -KILL "$master"
-wait "$master" 2>/dev/null || true
-sleep 1.5 # SYNC time-out, the ramp from the table's speed, a tenth of a second of standstill
-cansend vcan0 605#4041600000000000 # status word
-expect_frame '585#4B416000[0-9A-F]802?.*' 'an answer'
 kill "$dump"
 wait "$dump" 2>/dev/null || true
-python3 - <<'PYTHON' || fail "after the master's death: $(grep -E ' (085|585)#' dump.txt | tail -n 4)"
-import re
+cat >after_death.py <<'PYTHON'
+# What the drive did after the last SYNC; status 0: in time, 3: too late, 1: not what it should.
+import re, sys
 frames = [re.match(r"\((\d+\.\d+)\) vcan0 ([0-9A-F]{3})#([0-9A-F]*)", line).groups() for line in open("dump.txt")]
 frames = [(float(t), int(i, 16), bytes.fromhex(d)) for t, i, d in frames]
 last_sync = max(t for t, i, d in frames if i == 0x80)
-errors = [(t, int.from_bytes(d[:2], "little")) for t, i, d in frames if i == 0x85 and t > last_sync]
-# SYNC missing or the master's heartbeat missing (three of 100 ms), whichever is noticed first, and a little for the machine.
-assert errors and errors[0][1] in (0x8700, 0x8130) and errors[0][0] - last_sync < 0.4 + 0.2, (last_sync, errors)
+errors = [(t - last_sync, int.from_bytes(d[:2], "little")) for t, i, d in frames if i == 0x85 and t > last_sync]
+# SYNC missing, or the master's heartbeat (three of 100 ms): whichever is noticed first.
+if not errors or errors[0][1] not in (0x8700, 0x8130):
+    sys.exit(f"emergencies after the last SYNC: {errors}")
 answers = [d for t, i, d in frames if i == 0x585 and d[:4] == bytes.fromhex("4B416000")]
-status = int.from_bytes(answers[-1][4:6], "little")
-assert status & 0x4F == 0x08, hex(status)  # fault: without torque
+if not answers or answers[-1][4] & 0x4F != 0x08:
+    sys.exit(f"not in fault, without torque: {answers}")
+# 0.4 s is the longer of the two; the rest is for noticing it.
+sys.exit(0 if errors[0][0] < 0.4 + 0.1 else 3)
 PYTHON
-stop_drive
-grep -qE '^ended in state fault, error code (8700 \(SYNC missing\)|8130 )' drive.txt || fail "why it stopped: $(cat drive.txt)"
+
+kill_master() { # result: as after_death.py
+    candump -L vcan0 >dump.txt &
+    dump=$!
+    start_drive --can vcan0
+    "$SERVOSCOPE" measure --drive "can:vcan0?node=5&$patience" --table table.mst --periods 1000 --out killed.csv --quiet &
+    local master=$! result=0
+    for _ in {1..150}; do # until SYNCs have come for a while
+        [ "$(grep -c ' 080#' dump.txt)" -lt 600 ] || break
+        sleep 0.1
+    done
+    kill -KILL "$master"
+    wait "$master" 2>/dev/null || true
+    sleep 1.5                          # time-out, the ramp from the table's speed, a tenth of a second of standstill
+    cansend vcan0 605#4041600000000000 # status word
+    sleep 0.3
+    stop_drive
+    kill "$dump"
+    wait "$dump" 2>/dev/null || true
+    python3 after_death.py || result=$?
+    grep -qE '^ended in state fault, error code (8700|8130) \(.*(SYNC|heartbeat)' drive.txt ||
+        fail "why it stopped: $(cat drive.txt)"
+    return "$result"
+}
+
+# A machine that stands still for a while is late with everything: a drive that is late by itself is so each time.
+for attempt in 1 2 3 4; do
+    result=0
+    kill_master || result=$?
+    [ "$result" -eq 3 ] || break
+done
+[ "$result" -eq 0 ] || fail "the drive after its master's death: result $result of attempt $attempt"
 
 # ---- One at a time
 

@@ -73,8 +73,13 @@ grep -qx '# interrupted: true' cut.csv || fail "an interrupted run is not marked
 
 # Refusals
 refuse 2 '--drive is missing' --table table.mst --periods 3 --out x.csv
-for url in can:can0 slcan:localhost:29536 modbus-tcp:localhost:502 modbus-rtu:/dev/ttyS0:115200 nonsense; do
-    refuse 2 "'$url'" --drive "$url" --table table.mst --periods 3 --out x.csv
+refuse 2 "'nonsense' is no drive that this program can reach; expected sim:MODEL.json" --drive nonsense --table table.mst \
+    --periods 3 --out x.csv
+refuse 1 'nosuch: ' --drive can:nosuch --table table.mst --periods 3 --out x.csv
+refuse 1 'slcan:' --drive slcan:127.0.0.1:1 --table table.mst --periods 3 --out x.csv
+refuse 1 'nosuch' --drive slcan:/nosuch --table table.mst --periods 3 --out x.csv
+for query in node=0 node=128 node= 'node=5&bitrate=1' speed=3 profile=nosuch; do
+    refuse 2 '--drive' --drive "can:can0?$query" --table table.mst --periods 3 --out x.csv
 done
 refuse 2 '--limit-position is missing' "${all[@]}" --mode torque --out x.csv
 refuse 2 "--mode: 'velocity', expected cascade or torque" "${all[@]}" --mode velocity --out x.csv

@@ -367,6 +367,53 @@ static void test_can_faults_silent_master_stops_the_drive(void)
     TEST_ASSERT_EQUAL_UINT32(samples, bench.node.samples); // no further motion
 }
 
+static uint16_t heard_code; ///< of the last emergency on the bus
+
+static void hear_emergency(void *self, const struct can_frame *frame, uint64_t now_us)
+{
+    (void)self, (void)now_us;
+    struct emcy_message message;
+    if (emcy_parse(frame, 5, &message) && message.code != emcy_no_error)
+        heard_code = message.code;
+}
+
+/// kill -9 after any exchange: nothing but the drive itself is left to stop it.
+static void test_can_faults_master_that_dies_at_any_sample_leaves_no_motion(void)
+{
+    const double quick_stop = 50.0; // rad/s2, object 6085
+    double longest_ms = 0.0;
+    for (int count = 1; count <= 50; count++) {
+        setUp();
+        snprintf(where, sizeof where, "master dies after exchange %d", count);
+        struct can_port unused;
+        const struct can_participant ear = {.receive = hear_emergency};
+        inproc_bus_bind(&bench.bus, inproc_bus_add_participant(&bench.bus, &unused), &ear);
+        heard_code = 0;
+        move(count);
+        double speed = fabs(bench.node.drive.plant.velocity);
+        uint64_t sync_us = bench.node.node.sync.last_us;
+        inproc_bus_run(&bench.bus, sync_us + 1499);
+        TEST_ASSERT_EQUAL_MESSAGE(cia402_operation_enabled, bench.node.machine.state, where);
+        inproc_bus_run(&bench.bus, sync_us + 1510);
+        TEST_ASSERT_EQUAL_MESSAGE(cia402_fault_reaction_active, bench.node.machine.state, where);
+        TEST_ASSERT_EQUAL_MESSAGE(sim_control_stop, bench.node.command.control, where);
+        uint64_t t_us = sync_us + 1510;
+        while (bench.node.command.control != sim_control_off && t_us < sync_us + 1000000)
+            inproc_bus_run(&bench.bus, t_us += 100);
+        const double follows_ms = 102.0; // the motor's time to follow the ramp, at most, and the sample that ends it
+        double bound_ms = 1.5 + speed / quick_stop * 1e3 + follows_ms, took_ms = (double)(t_us - sync_us) / 1e3;
+        TEST_ASSERT_TRUE_MESSAGE(took_ms <= bound_ms, where);
+        longest_ms = fmax(longest_ms, took_ms);
+        inproc_bus_run(&bench.bus, t_us + 500000);
+        double position = bench.node.drive.plant.position;
+        inproc_bus_run(&bench.bus, t_us + 1500000);
+        TEST_ASSERT_TRUE_MESSAGE(!(fabs(bench.node.drive.plant.position - position) > 0.0), where);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(emcy_sync_lost, heard_code, where);
+        TEST_ASSERT_EQUAL_MESSAGE(cia402_fault, bench.node.machine.state, where);
+    }
+    printf("a master that dies: without torque after %.1f ms at most, 1.5 periods included\n", longest_ms);
+}
+
 static void test_can_faults_lost_heartbeat_of_master_stops_the_drive(void)
 {
     move(5);
@@ -431,6 +478,7 @@ int main(void)
     RUN_TEST(test_can_faults_drive_back_on_the_bus_reports_it);
     RUN_TEST(test_can_faults_master_off_the_bus_ends_the_run);
     RUN_TEST(test_can_faults_silent_master_stops_the_drive);
+    RUN_TEST(test_can_faults_master_that_dies_at_any_sample_leaves_no_motion);
     RUN_TEST(test_can_faults_lost_heartbeat_of_master_stops_the_drive);
     RUN_TEST(test_can_faults_node_reset_ends_the_run);
     RUN_TEST(test_can_faults_node_stopped_by_nmt_ends_the_run);

@@ -294,6 +294,8 @@ static void test_block_choice_folds_no_further_than_it_can(void)
     TEST_ASSERT_EQUAL_UINT32(4, layout.repeats);
     TEST_ASSERT_EQUAL_UINT32(64, layout.block_samples);
     TEST_ASSERT_TRUE(layout.terms < 64);
+    frf_block_choose(bins, 1, 96, 0, &layout); /* one block of 64 is no two */
+    TEST_ASSERT_EQUAL_UINT32(32, layout.block_samples);
     frf_block_choose(many, 0, 65536, 65536, &layout);
     TEST_ASSERT_EQUAL_UINT32(0, layout.block_samples);
 }

@@ -293,9 +293,11 @@ static int usage(FILE *out)
             "usage: hidden_cases --program PATH [--cases N] [--minutes M] [--seed S | --fresh] [--jobs 2]\n"
             "       [--kind KIND[+KIND...][,KIND...]] [--size clear|moderate|faint] [--protocol multisine|stroke]\n"
             "       [--only clean|single|combination|unknown] [--work DIR] [--keep] [--time-limit SECONDS]\n"
-            "       [--bound RATE=VALUE]\n"
+            "       [--bound RATE=VALUE] [--beyond-chance]\n"
             "Hides effects in data of a drive that shares no code with the program, has PATH diagnose them, and\n"
-            "exits with 1 when a rate is beyond its bound.\nRates, and what is required of 400 fresh cases:");
+            "exits with 1 when a rate is beyond its bound; with --beyond-chance only where so few cases, each as good\n"
+            "as required, would break it less than once in a thousand times.\nRates, and what is required of 400 fresh "
+            "cases:");
     for (int rate = 0; rate < hidden_rate_count; rate++) {
         fprintf(out, " %s=%g", hidden_rate_name((enum hidden_rate)rate), hidden_rate_bound((enum hidden_rate)rate));
     }
@@ -410,6 +412,8 @@ static int parse(struct hidden_options *self, int argc, char **argv)
             self->seed = clock_seed();
         } else if (strcmp(argv[i], "--keep") == 0) {
             self->keep = 1;
+        } else if (strcmp(argv[i], "--beyond-chance") == 0) {
+            self->beyond_chance = 1;
         } else if (i + 1 >= argc || set_option(self, argv[i], argv[i + 1])) {
             fprintf(stderr, "hidden_cases: %s: not understood\n", argv[i]);
             return -1;

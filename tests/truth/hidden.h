@@ -31,7 +31,8 @@ struct hidden_options {
     const char *program;
     const char *work;
     int cases, jobs, time_limit_s, keep;
-    double minutes; ///< 0: no limit
+    int beyond_chance; ///< a rate breaks its bound only if chance would do that less than once in a thousand
+    double minutes;    ///< 0: no limit
     uint64_t seed;
     enum truth_size size; ///< truth_size_count: in turn
     enum truth_protocol protocol;

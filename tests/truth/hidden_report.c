@@ -103,6 +103,32 @@ static void wilson(struct share share, double *out_low, double *out_high)
     *out_high = n > 0.0 ? fmin(1.0, middle + reach) : 1.0;
 }
 
+// Chance that of `whole` cases, each with the chance `p`, `low` to `high` come out so.
+static double binomial(int low, int high, int whole, double p)
+{
+    double sum = 0.0;
+    for (int k = low; k <= high; k++) {
+        double ways = lgamma(whole + 1.0) - lgamma(k + 1.0) - lgamma(whole - k + 1.0);
+        double yes = k > 0 ? k * log(p) : 0.0, no = k < whole ? (whole - k) * log1p(-p) : 0.0;
+        sum += exp(ways + yes + no);
+    }
+    return sum;
+}
+
+static int is_broken(const struct hidden_options *options, enum hidden_rate rate, struct share share)
+{
+    const double once_in = 1e-3;
+    double bound = options->bound[rate], reached = share.whole ? (double)share.part / share.whole : 0.0;
+    if (!share.whole || (rates[rate].at_least ? reached >= bound : reached <= bound)) {
+        return 0;
+    }
+    if (!options->beyond_chance) {
+        return 1;
+    }
+    return (rates[rate].at_least ? binomial(0, share.part, share.whole, bound)
+                                 : binomial(share.part, share.whole, share.whole, bound)) < once_in;
+}
+
 // Prints the rates beside their bounds; how many are broken. A class without cases breaks nothing.
 static int print_rates(const struct hidden_options *options, const struct share *shares)
 {
@@ -111,7 +137,7 @@ static int print_rates(const struct hidden_options *options, const struct share 
     for (int i = 0; i < hidden_rate_count; i++) {
         double low, high, share = shares[i].whole ? (double)shares[i].part / shares[i].whole : 0.0;
         double bound = options->bound[i];
-        int bad = shares[i].whole && (rates[i].at_least ? share < bound : share > bound);
+        int bad = is_broken(options, (enum hidden_rate)i, shares[i]);
         wilson(shares[i], &low, &high);
         printf("%-44s %5d of %4d %6.1f %%  %5.1f .. %5.1f %%  %s %.0f %%%s\n", rates[i].says, shares[i].part,
                shares[i].whole, 100.0 * share, 100.0 * low, 100.0 * high,
@@ -210,6 +236,55 @@ static void print_detection(const struct hidden_record *records, int cases)
     }
 }
 
+static double percent(int part, int whole)
+{
+    return whole ? 100.0 * part / whole : 0.0;
+}
+
+static void print_parameters_of(const char *name, const struct score *sum)
+{
+    if (sum->parameters) {
+        printf("  %-27s %10d %9.0f %% %9.0f %% %9.0f %% %12.1f\n", name, sum->parameters,
+               percent(sum->parameters_within_1_std, sum->parameters),
+               percent(sum->parameters_within_2_std, sum->parameters),
+               percent(sum->parameters_within_3_std, sum->parameters), sum->worst_z);
+    }
+}
+
+static void add_parameters(struct score *self, const struct score *more)
+{
+    self->parameters += more->parameters;
+    self->parameters_within_1_std += more->parameters_within_1_std;
+    self->parameters_within_2_std += more->parameters_within_2_std;
+    self->parameters_within_3_std += more->parameters_within_3_std;
+    self->worst_z = fmax(self->worst_z, more->parameters ? more->worst_z : 0.0);
+}
+
+static void print_parameters(const struct hidden_record *records, int cases)
+{
+    struct score all = {0}, combinations = {0};
+    printf("\nerrors of parameters over their stated standard deviations (of a normal error 68, 95 and 99.7 %%)\n");
+    printf("  %-27s %10s %11s %11s %11s %12s\n", "", "parameters", "within 1", "within 2", "within 3", "largest");
+    for (int kind = 1; kind < truth_kind_count; kind++) {
+        struct score sum = {0};
+        for (int i = 0; i < cases; i++) {
+            if (records[i].done && records[i].wish.causes == 1 && (int)records[i].wish.kind[0] == kind) {
+                add_parameters(&sum, &records[i].score);
+            }
+        }
+        print_parameters_of(truth_kind_name((enum truth_kind)kind), &sum);
+        add_parameters(&all, &sum);
+    }
+    for (int i = 0; i < cases; i++) {
+        if (records[i].done && records[i].class == hidden_combination) {
+            add_parameters(&combinations, &records[i].score);
+        }
+    }
+    print_parameters_of("combinations", &combinations);
+    add_parameters(&all, &combinations);
+    print_parameters_of("all", &all);
+}
+
 static int ascending(const void *a, const void *b)
 {
     double x = *(const double *)a, y = *(const double *)b;
@@ -271,6 +346,7 @@ int hidden_report(const struct hidden_options *options, const struct hidden_reco
     count(records, options->cases, shares);
     print_confusion(records, options->cases);
     print_detection(records, options->cases);
+    print_parameters(records, options->cases);
     print_failures(options, records);
     int broken = print_rates(options, shares);
     printf("another cause of a stated tie: %d; other causes that make the same motion: %d; sizes not reached: %d\n",

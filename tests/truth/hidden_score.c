@@ -135,6 +135,8 @@ static void compare_parameter(struct score *self, const struct truth_parameter *
         z = fmin(z, 3.0);
     }
     self->parameters++;
+    self->parameters_within_1_std += z <= 1.0;
+    self->parameters_within_2_std += z <= 2.0;
     self->parameters_within_3_std += z <= 3.0;
     if (isnan(self->worst_z) || z > self->worst_z) {
         self->worst_z = z;

@@ -23,7 +23,7 @@ struct score {
     char named[SCORE_TEXT_LENGTH]; ///< causes joined by "+", else the verdict, else why it failed
     char verdict[24];
     int causes, causes_there; ///< named; and of them in the truth
-    int parameters, parameters_within_3_std;
+    int parameters, parameters_within_1_std, parameters_within_2_std, parameters_within_3_std;
     double worst_z; ///< largest error over stated standard deviation among the parameters of true causes
     char worst_parameter[SCORE_TEXT_LENGTH];
     double left_nats; ///< expected evidence of the truth over the named causes, where they are not the truth

@@ -297,6 +297,10 @@ double truth_case_left_nats(const struct truth_case *self, const struct truth_dr
 {
     const struct truth_evidence_setting setting = {
         &self->controller, &self->fit, self->periods, truth_case_noise_seed(self), 0u, 1, 0};
+    // Repeated rows are no matter of the motion: a drive with them is never the same as one without.
+    if ((self->truth.sensors.lost_share > 0.0) != (other->sensors.lost_share > 0.0)) {
+        return INFINITY;
+    }
     struct truth_evidence *evidence = malloc(sizeof *evidence);
     double nats = NAN;
     if (evidence && !truth_evidence_find(&self->truth, other, &setting, evidence)) {

@@ -488,6 +488,8 @@ static int set_plant(enum truth_kind kind, const char *name, double value, struc
         {truth_kind_cogging, "amplitude_Nm", &io->cogging_amplitude_Nm},
         {truth_kind_cogging, "periods_per_rev", &io->cogging_periods_per_rev},
         {truth_kind_cogging, "phase_rad", &io->cogging_phase_rad},
+        {truth_kind_periodic_disturbance, "amplitude_Nm", &io->disturbance_amplitude_Nm},
+        {truth_kind_periodic_disturbance, "frequency_hz", &io->disturbance_hz},
     };
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
         if (known[i].kind == kind && strcmp(known[i].name, name) == 0) {
@@ -500,10 +502,59 @@ static int set_plant(enum truth_kind kind, const char *name, double value, struc
     return -1;
 }
 
+// Third mass, its spring and its damper by frequency, inertia and damping ratio, in any order.
+static int set_mode(const char *name, double value, struct truth_plant_spec *io)
+{
+    if (io->third_inertia_kgm2 == 0.0) {
+        io->third_inertia_kgm2 = io->third_stiffness_Nm_per_rad = 1.0;
+        io->third_damping_Nms_per_rad = 0.0;
+    }
+    double w = sqrt(io->third_stiffness_Nm_per_rad / io->third_inertia_kgm2);
+    double ratio = io->third_damping_Nms_per_rad / (2.0 * io->third_inertia_kgm2 * w);
+    if (strcmp(name, "mode_frequency_hz") == 0) {
+        w = two_pi * value;
+    } else if (strcmp(name, "mode_inertia_kgm2") == 0) {
+        io->third_inertia_kgm2 = value;
+    } else if (strcmp(name, "mode_damping_ratio") == 0) {
+        ratio = value;
+    } else {
+        return -1;
+    }
+    io->third_stiffness_Nm_per_rad = io->third_inertia_kgm2 * w * w;
+    io->third_damping_Nms_per_rad = 2.0 * ratio * io->third_inertia_kgm2 * w;
+    return 0;
+}
+
+static int set_sensor(enum truth_kind kind, const char *name, double value, struct truth_sensors *io)
+{
+    if (kind == truth_kind_lost_samples && strcmp(name, "share") == 0) {
+        io->lost_share = value;
+    } else if (kind != truth_kind_encoder_eccentricity) {
+        return -1;
+    } else if (strcmp(name, "amplitude_rad") == 0) {
+        io->eccentricity_rad = value;
+    } else if (strcmp(name, "phase_rad") == 0) {
+        io->eccentricity_phase_rad = value;
+    } else if (strcmp(name, "speed_error_ratio") == 0) {
+        io->speed_from_encoder = value > 0.5;
+    } else {
+        return -1;
+    }
+    return 0;
+}
+
 int truth_kind_set(enum truth_kind kind, const char *name, double value, struct truth_drive *io_drive)
 {
     struct truth_plant_spec *plant = &io_drive->plant;
-    if (!set_plant(kind, name, value, plant)) {
+    if (!set_plant(kind, name, value, plant) || !set_sensor(kind, name, value, &io_drive->sensors)) {
+        return 0;
+    }
+    if (kind == truth_kind_second_mode) {
+        return set_mode(name, value, plant);
+    }
+    if (kind == truth_kind_periodic_disturbance && strcmp(name, "phase_rad") == 0) {
+        // Diagnosis has a cosine that opposes, this plant a sine that pushes.
+        plant->disturbance_phase_rad = value - 0.25 * two_pi;
         return 0;
     }
     if (kind == truth_kind_belt_elasticity) {

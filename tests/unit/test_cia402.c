@@ -160,6 +160,13 @@ struct expectation {
     bool reset;
 };
 
+/// 605B and 605C: whether operation enabled is left for this state by a ramp.
+static bool ramps_to(int state, const struct cia402_options *options)
+{
+    return (state == cia402_ready && options->shutdown == 1) ||
+           (state == cia402_switched_on && options->disable_operation == 1);
+}
+
 /// What a word does to a machine whose options are given and whose last word was `before`.
 static struct expectation expected_after(enum cia402_state from, uint16_t before, uint16_t word,
                                          const struct cia402_options *options)
@@ -168,11 +175,10 @@ static struct expectation expected_after(enum cia402_state from, uint16_t before
     if (from == cia402_fault && (word & 0x80) && !(before & 0x80))
         return (struct expectation){cia402_switch_on_disabled, false, true};
     int to = diagram_after(from, word);
-    bool stays = options->quick_stop == 5 || options->quick_stop == 6;
+    bool stays = options->quick_stop >= 5;
     if (to < 0 || (from == cia402_quick_stop_active && to == cia402_operation_enabled && !stays))
         return e;
-    if (from == cia402_operation_enabled && ((to == cia402_ready && options->shutdown == 1) ||
-                                             (to == cia402_switched_on && options->disable_operation == 1))) {
+    if (from == cia402_operation_enabled && ramps_to(to, options)) {
         e.leaving = true;
         return e;
     }

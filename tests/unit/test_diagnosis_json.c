@@ -91,6 +91,7 @@ static void test_diagnosis_json_has_ties_untestable_and_figures(void)
     TEST_ASSERT_EQUAL_STRING(diagnosis.untestable[0].why, string(untestable, "why"));
     TEST_ASSERT_EQUAL_DOUBLE(0.2134, number(member(root, "nominal"), "validation_nrmse"));
     TEST_ASSERT_EQUAL_DOUBLE(3.4, number(member(root, "refitted"), "whitened_rms"));
+    TEST_ASSERT_EQUAL_DOUBLE(10.2, number(member(root, "refitted"), "mean_rms"));
     TEST_ASSERT_EQUAL_DOUBLE(0.0502, number(member(root, "extended"), "validation_nrmse"));
     TEST_ASSERT_EQUAL_DOUBLE(0.0481, number(root, "noise_floor_nrmse"));
     TEST_ASSERT_EQUAL_INT(0, cJSON_GetArraySize(member(root, "candidates")));

@@ -673,11 +673,68 @@ static void test_causes_have_names_and_values(void)
     TEST_ASSERT_EQUAL_INT64(12, step_real_value(&blind));
 }
 
+/* Storage is not initialised before, and a guard is set up and armed again and again. */
+static void test_init_and_arm_leave_nothing_of_before(void)
+{
+    const struct vector good = {GOOD};
+    struct guard guard;
+    struct guard_real real;
+    struct guard_limits limits = integer_guard(&good).limits;
+    struct guard_real_limits real_limits = real_guard(&good).limits;
+    memset(&guard, 0x5A, sizeof guard);
+    memset(&real, 0x5A, sizeof real);
+    TEST_ASSERT_EQUAL_INT(core_ok, guard_init(&guard, &limits));
+    TEST_ASSERT_EQUAL_INT(core_ok, guard_real_init(&real, &real_limits));
+    TEST_ASSERT_EQUAL_INT32(0, guard.trip_value);
+    TEST_ASSERT_EQUAL_INT32(0, guard.last_position);
+    TEST_ASSERT_TRUE(real.trip_value == 0 && real.last_position_rad == 0);
+    const struct guard_state *const states[2] = {&guard.state, &real.state};
+    for (unsigned i = 0; i < 2; i++) {
+        TEST_ASSERT_EQUAL_INT(guard_idle, states[i]->mode);
+        TEST_ASSERT_EQUAL_INT(guard_cause_none, states[i]->cause);
+        TEST_ASSERT_EQUAL_UINT32(9, states[i]->watchdog_samples);
+        TEST_ASSERT_EQUAL_UINT32(9, states[i]->stuck_samples);
+        TEST_ASSERT_EQUAL_UINT32(0, states[i]->silent_samples);
+        TEST_ASSERT_EQUAL_UINT32(0, states[i]->still_samples);
+        TEST_ASSERT_EQUAL_UINT32(0, states[i]->signs_of_life);
+        TEST_ASSERT_EQUAL_UINT32(0, states[i]->signs_seen);
+        TEST_ASSERT_EQUAL_UINT32(0, states[i]->count.trips);
+        TEST_ASSERT_EQUAL_UINT32(0, states[i]->count.torque_clipped);
+    }
+    guard.trip_value = 5;
+    real.trip_value = 5;
+    struct guard_sample now = integer_sample(&good);
+    struct guard_real_sample real_now = real_sample(&good);
+    guard_alive(&guard.state); /* of the time before it was armed: no sign of life of the one after */
+    TEST_ASSERT_EQUAL_INT(core_ok, guard_arm(&guard, &now));
+    TEST_ASSERT_EQUAL_INT(core_ok, guard_real_arm(&real, &real_now));
+    TEST_ASSERT_EQUAL_INT32(0, guard.trip_value);
+    TEST_ASSERT_TRUE(real.trip_value == 0);
+    TEST_ASSERT_EQUAL_INT(guard_run, guard_step(&guard, &now));
+    TEST_ASSERT_EQUAL_UINT32(1, guard.state.silent_samples);
+}
+
+/* Still is: unmoved since the sample before, wherever that was; moved by however little, either way, is not. */
+static void test_real_still_is_judged_from_sample_to_sample(void)
+{
+    static const core_real positions[] = {7, 7, (core_real)7.5, (core_real)7.5, 7, 7, 7};
+    static const uint32_t still[] = {0, 1, 0, 1, 0, 1, 2};
+    const struct vector good = {GOOD};
+    struct guard_real guard = real_guard(&good);
+    for (unsigned s = 0; s < 7; s++) {
+        struct guard_real_sample sample = {positions[s], 0, 20, true};
+        guard_real_step(&guard, &sample);
+        TEST_ASSERT_EQUAL_UINT32(still[s], guard.state.still_samples);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_conditions_decide_alone);
     RUN_TEST(test_conditions_are_those_of_the_sources);
     RUN_TEST(test_causes_have_names_and_values);
+    RUN_TEST(test_init_and_arm_leave_nothing_of_before);
+    RUN_TEST(test_real_still_is_judged_from_sample_to_sample);
     return UNITY_END();
 }

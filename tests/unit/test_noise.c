@@ -3,6 +3,7 @@
 /// channels and however they go together.
 #include "lab/diagnose/noise.h"
 
+#include "lab/diagnose/validate.h"
 #include "lab/numeric/statistics.h"
 #include "sim/plant.h"
 #include "unity.h"
@@ -289,6 +290,42 @@ static void test_noise_transform_is_the_dft_over_the_length(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-13, 0.0, spectrum[64]);
 }
 
+/// Figures of the model that made the data, over many runs of few periods: what the estimate of the noise itself adds.
+struct perfect {
+    double mean_square, whole_square; ///< means over the runs
+    unsigned beyond;                  ///< runs whose mean_rms is larger than what chance allows once in twenty
+};
+
+static struct perfect measure_perfect(unsigned runs, size_t periods)
+{
+    const struct noise noise = {.mechanics = 0.01, .actuator = 0.005, .common = 0.01};
+    struct perfect p = {0};
+    for (unsigned i = 0; i < runs; i++) {
+        record(&noise, 100 + i, periods);
+        prepare(periods, true);
+        struct fit_data data = {.runs = 1, .evidence = &evidence, .values = evidence.values};
+        struct diagnosis_figures figures = validate_figures(&data, &model);
+        p.mean_square += figures.mean_rms * figures.mean_rms / runs;
+        p.whole_square += figures.whitened_rms * figures.whitened_rms / runs;
+        p.beyond += figures.mean_rms > validate_mean_rms_chance(&data);
+        tearDown();
+    }
+    return p;
+}
+
+static void test_noise_of_few_periods_leaves_a_perfect_model_at_one(void)
+{
+    // Two channels, 21 bins, 3 scatters each: without its bias taken back the estimate would give 63 / 61, 1.033.
+    enum { runs = 100, periods = 4 };
+    double values = 4.0 * band + 1.0, deviation = sqrt(2.0 / values * periods / (periods - 1.0) / runs);
+    struct perfect p = measure_perfect(runs, periods);
+    TEST_ASSERT_DOUBLE_WITHIN(normal_bound * deviation, 1.0, p.mean_square);
+    // What differs between the periods is whitened by itself: only the mean's share scatters.
+    TEST_ASSERT_DOUBLE_WITHIN(normal_bound * deviation / periods + 0.002, 1.0, p.whole_square);
+    // Five expected; fifteen or more come about once in ten thousand.
+    TEST_ASSERT_LESS_THAN_UINT(15, p.beyond);
+}
+
 static void test_noise_of_a_run_without_periods_comes_from_its_own_residual(void)
 {
     record(&(struct noise){.mechanics = 0.01, .actuator = 0.004, .common = 0.01}, 10, 3);
@@ -328,6 +365,7 @@ int main(void)
     RUN_TEST(test_noise_single_channel_without_reference);
     RUN_TEST(test_noise_numbers_values_by_bin_and_channel);
     RUN_TEST(test_noise_transform_is_the_dft_over_the_length);
+    RUN_TEST(test_noise_of_few_periods_leaves_a_perfect_model_at_one);
     RUN_TEST(test_noise_of_a_run_without_periods_comes_from_its_own_residual);
     return UNITY_END();
 }

@@ -218,7 +218,8 @@ static void test_sdo_long_refuses_what_does_not_fit(void)
     TEST_ASSERT_EQUAL_UINT32(1, owner.odd_refused);
 }
 
-/// Every frame of a transfer is lost, doubled or changed once: the right bytes arrive, or the client knows they did not.
+/// Every frame of a transfer is lost, doubled or changed once: the right bytes arrive, or the client knows they did
+/// not.
 static void survives(int kind, enum sdo_method method, bool download, uint32_t size)
 {
     unsigned frames = 0;

@@ -151,6 +151,21 @@ static void test_simulated_drive_offers_cyclic_modes_and_profile_torque_but_no_h
     TEST_ASSERT_EQUAL_HEX32(od_abort_state, write_object(cia402_modes_of_operation, 0, cia402_mode_csp));
 }
 
+static void test_simulated_drive_changes_its_mode_in_operation_only_at_rest(void)
+{
+    turn(2.0);
+    command(cia402_control_enable_operation | cia402_control_halt);
+    cycles(1);
+    TEST_ASSERT_EQUAL_HEX32(od_abort_state, write_object(cia402_modes_of_operation, 0, cia402_mode_csp));
+    cycles(500);
+    put(cia402_target_position, 0, 123456);
+    put(cia402_modes_of_operation, 0, cia402_mode_csp);
+    command(cia402_control_enable_operation);
+    int32_t before = drive.objects.position_actual;
+    cycles(50);
+    TEST_ASSERT_INT32_WITHIN(200, before, drive.objects.position_actual);
+}
+
 static void test_simulated_drive_csv_follows_60ff_plus_60b1_within_607f(void)
 {
     turn(5.0);
@@ -430,6 +445,17 @@ static void test_simulated_drive_software_limits_stop_velocity_and_torque_modes(
     cycles(200);
     TEST_ASSERT_EQUAL(cia402_operation_enabled, drive.machine.state);
     TEST_ASSERT_TRUE(drive.objects.position_actual < 20000);
+}
+
+static void test_simulated_drive_software_limits_hold_backwards_too(void)
+{
+    put(cia402_position_limit, 1, -20000);
+    enable(cia402_mode_csv);
+    put(cia402_target_velocity, 0, -3000000);
+    cycles(300);
+    TEST_ASSERT_EQUAL_UINT16(emcy_travel, last_emergency());
+    cycles(300);
+    TEST_ASSERT_EQUAL(cia402_fault, drive.machine.state);
 }
 
 static bool faults_with_window(uint32_t window, int32_t error, uint16_t timeout_ms, unsigned samples)
@@ -737,6 +763,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_simulated_drive_offers_cyclic_modes_and_profile_torque_but_no_homing);
+    RUN_TEST(test_simulated_drive_changes_its_mode_in_operation_only_at_rest);
     RUN_TEST(test_simulated_drive_csv_follows_60ff_plus_60b1_within_607f);
     RUN_TEST(test_simulated_drive_profile_torque_moves_on_its_slope);
     RUN_TEST(test_simulated_drive_cst_adds_offset_and_clips_to_6072);
@@ -748,6 +775,7 @@ int main(void)
     RUN_TEST(test_simulated_drive_lost_connection_is_6007);
     RUN_TEST(test_simulated_drive_software_limits_clip_csp_set_points);
     RUN_TEST(test_simulated_drive_software_limits_stop_velocity_and_torque_modes);
+    RUN_TEST(test_simulated_drive_software_limits_hold_backwards_too);
     RUN_TEST(test_simulated_drive_following_error_holds_to_one_count_and_one_sample);
     RUN_TEST(test_simulated_drive_speed_limit_holds_to_the_last_bit);
     RUN_TEST(test_simulated_drive_dead_encoder_takes_the_torque_off_at_once);

@@ -186,6 +186,27 @@ static void test_truth_case_stroke_is_more_than_a_turn_in_both_runs(void)
     }
 }
 
+static void test_truth_case_given_the_numbers_of_a_diagnosis_is_that_drive(void)
+{
+    const double two_pi = 6.283185307179586;
+    make(truth_kind_clean, truth_size_clear, 3u);
+    struct truth_drive drive = truth_case_drive(&made, 0u);
+    TEST_ASSERT_EQUAL_INT(0, truth_kind_set(truth_kind_second_mode, "mode_damping_ratio", 0.03, &drive));
+    TEST_ASSERT_EQUAL_INT(0, truth_kind_set(truth_kind_second_mode, "mode_inertia_kgm2", 2e-4, &drive));
+    TEST_ASSERT_EQUAL_INT(0, truth_kind_set(truth_kind_second_mode, "mode_frequency_hz", 40.0, &drive));
+    double w = two_pi * 40.0;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2e-4 * w * w, drive.plant.third_stiffness_Nm_per_rad);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0 * 0.03 * 2e-4 * w, drive.plant.third_damping_Nms_per_rad);
+    TEST_ASSERT_EQUAL_INT(0, truth_kind_set(truth_kind_periodic_disturbance, "amplitude_Nm", 0.02, &drive));
+    TEST_ASSERT_EQUAL_INT(0, truth_kind_set(truth_kind_periodic_disturbance, "phase_rad", 0.5, &drive));
+    // a sin(phase) pushes, a cos(phase) of the diagnosis opposes
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.02 * cos(0.5),
+                              drive.plant.disturbance_amplitude_Nm * sin(drive.plant.disturbance_phase_rad));
+    TEST_ASSERT_EQUAL_INT(0, truth_kind_set(truth_kind_encoder_eccentricity, "speed_error_ratio", 0.02, &drive));
+    TEST_ASSERT_EQUAL_INT(0, drive.sensors.speed_from_encoder);
+    TEST_ASSERT_EQUAL_INT(-1, truth_kind_set(truth_kind_second_mode, "amplitude_rad", 1.0, &drive));
+}
+
 static void test_truth_case_given_its_own_parameters_is_not_short_of_the_truth(void)
 {
     static const enum truth_kind kinds[] = {truth_kind_stribeck_friction, truth_kind_friction_drift};
@@ -201,6 +222,9 @@ static void test_truth_case_given_its_own_parameters_is_not_short_of_the_truth(v
         TEST_ASSERT_TRUE_MESSAGE(truth_case_left_nats(&made, &drive) < 1.0, truth_kind_name(kinds[i]));
     }
     struct truth_drive drive = truth_case_drive(&made, 0u);
+    drive.sensors.lost_share = 0.01;
+    TEST_ASSERT_TRUE(isinf(truth_case_left_nats(&made, &drive)));
+    drive = truth_case_drive(&made, 0u);
     TEST_ASSERT_EQUAL_INT(-1, truth_kind_set(truth_kind_backlash, "bias_Nm", 1.0, &drive));
 }
 
@@ -353,6 +377,7 @@ int main(void)
     RUN_TEST(test_truth_case_combination_shows_each_of_its_causes);
     RUN_TEST(test_truth_case_cogging_has_two_periods_under_the_motion);
     RUN_TEST(test_truth_case_stroke_is_more_than_a_turn_in_both_runs);
+    RUN_TEST(test_truth_case_given_the_numbers_of_a_diagnosis_is_that_drive);
     RUN_TEST(test_truth_case_given_its_own_parameters_is_not_short_of_the_truth);
     RUN_TEST(test_truth_evidence_is_nothing_between_equal_drives);
     RUN_TEST(test_truth_evidence_leaves_out_what_a_refit_takes_up);

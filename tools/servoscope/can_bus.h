@@ -2,7 +2,8 @@
 /// The CAN buses that the program reaches outside of itself, by name, from either end.
 ///   IFACE             a CAN interface of this machine
 ///   slcan:HOST:PORT   slcan over TCP: the master connects to an adapter, the drive is one and listens
-///   slcan:/PATH       slcan over a serial line: the master opens the device, the drive makes a pty and PATH a link to it
+///   slcan:/PATH       slcan over a serial line: the master opens the device, the drive makes a pty and PATH a link to
+///   it
 ///   slcan-connect:HOST:PORT, slcan-connect:/PATH   the drive behind somebody else's adapter
 #ifndef SERVOSCOPE_TOOLS_CAN_BUS_H
 #define SERVOSCOPE_TOOLS_CAN_BUS_H

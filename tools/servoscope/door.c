@@ -2,12 +2,14 @@
 #include "tools/servoscope/door.h"
 
 #include "tools/servoscope/door_parts.h"
+#include "tools/servoscope/options.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const struct door_scheme *const schemes[] = {&door_simulated, &door_can, &door_slcan};
+static const struct door_scheme *const schemes[] = {&door_simulated, &door_can, &door_slcan, &door_odrive,
+                                                    &door_odrive_slcan};
 enum { scheme_count = sizeof schemes / sizeof schemes[0] };
 
 int door_open(const char *url, const struct sim_model *model, struct door *out_door, struct error *out_error)
@@ -22,7 +24,10 @@ int door_open(const char *url, const struct sim_model *model, struct door *out_d
             out_door->scheme = scheme;
             return status;
         }
-        snprintf(&forms[used], sizeof forms - used, "%s%s", i == 0 ? "" : i + 1 < scheme_count ? ", " : " or ",
+        snprintf(&forms[used], sizeof forms - used, "%s%s",
+                 i == 0                 ? ""
+                 : i + 1 < scheme_count ? ", "
+                                        : " or ",
                  scheme->form);
     }
     return error_set(out_error, error_usage, "--drive: '%s' is no drive that this program can reach; expected %s", url,
@@ -73,13 +78,19 @@ static int read_pair(const struct door_scheme *scheme, char *pair, struct door_q
         *equals = '\0';
     }
     if (strcmp(pair, "node") == 0) {
-        return read_number(pair, value, 1, 127, &io_query->node, out_error);
+        return read_number(pair, value, scheme->node_lowest, scheme->node_highest, &io_query->node, out_error);
     }
     if (strcmp(pair, "bitrate") == 0) {
         return read_number(pair, value, 10000, 1000000, &io_query->bitrate, out_error);
     }
     if (strcmp(pair, "sync_timeout_ms") == 0) {
         return read_number(pair, value, 1, 10000, &io_query->sync_timeout_ms, out_error);
+    }
+    if (strcmp(pair, "kt") == 0) {
+        int status = options_parse_number("--drive: kt", value, &io_query->torque_constant_Nm_per_A, out_error);
+        return status || io_query->torque_constant_Nm_per_A > 0.0
+                   ? status
+                   : error_set(out_error, error_usage, "--drive: kt=%s: expected a torque constant above 0", value);
     }
     if (strcmp(pair, "profile") == 0 && *value != '\0') {
         snprintf(io_query->profile, sizeof io_query->profile, "%s", value);
@@ -95,7 +106,7 @@ int door_read_query(const struct door_scheme *scheme, const char *rest, struct d
     char pairs[256];
     const char *mark = strchr(rest, '?');
     int length = mark ? (int)(mark - rest) : (int)strlen(rest);
-    *out_query = (struct door_query){.node = 5, .bitrate = 1000000};
+    *out_query = (struct door_query){.node = scheme->node_default, .bitrate = 1000000};
     if (length == 0 || (size_t)length >= sizeof out_query->address || (mark && strlen(mark) >= sizeof pairs)) {
         return error_set(out_error, error_usage, "--drive: '%s%s': expected %s", scheme->prefix, rest, scheme->form);
     }

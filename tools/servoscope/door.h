@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /// From a drive's URL to a drive: the one place that knows which port and which protocol stand behind a door.
 ///   sim:MODEL.json            the simulated drive, spoken to in CAN frames over a bus inside the program
+///   odrive:IFACE?node=N, odrive-slcan:HOST:PORT?node=N   an ODrive (CAN Simple)
 ///   can:IFACE?node=N          a CiA 402 drive on a CAN interface of this machine
-///   slcan:HOST:PORT?node=N    the same behind an slcan adapter over TCP, or slcan:/dev/ttyACM0?node=N over a serial line
+///   slcan:HOST:PORT?node=N    the same behind an slcan adapter over TCP, or slcan:/dev/ttyACM0?node=N over a serial
+///   line
 /// A new kind is one entry in door.c's table and one file door_NAME.c.
 #ifndef SERVOSCOPE_TOOLS_DOOR_H
 #define SERVOSCOPE_TOOLS_DOOR_H
@@ -20,7 +22,12 @@
     "sim:MODEL.json: the simulated drive of a model file, on a CAN bus inside the program\n"                           \
     "                       can:IFACE?node=N: a CiA 402 drive on a CAN interface (can0); node 5 if not said\n"         \
     "                       slcan:HOST:PORT?node=N, slcan:/dev/ttyACM0?node=N: the same behind an slcan adapter;\n"    \
-    "                       &bitrate=B: of the bus, bit/s (default 1000000)"
+    "                       more behind '?': &bitrate=B of the bus (default 1000000), &profile=NAME of the drive's "   \
+    "make,\n"                                                                                                          \
+    "                       &sync_timeout_ms=T where this machine cannot keep pace (docs/bus.md)\n"                    \
+    "                       odrive:IFACE?node=N, odrive-slcan:HOST:PORT?node=N: an ODrive, node 0 if not said; "       \
+    "&kt=K:\n"                                                                                                         \
+    "                       its torque constant in Nm/A, which --mode cascade needs"
 
 struct door_scheme;
 
@@ -49,7 +56,7 @@ struct door_statistics {
     uint32_t frames_lost;   ///< that arrived and nobody took in time
     uint32_t error_frames;
     uint32_t sync_timeout_us;     ///< set in the drive
-    char rights[160];             ///< real-time rights, one line
+    char rights[192];             ///< real-time rights, one line
     struct bus_histogram spacing; ///< |spacing of SYNCs - period|, us
     struct bus_histogram reply;   ///< from SYNC to the last TPDO, us
 };

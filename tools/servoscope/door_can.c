@@ -37,7 +37,8 @@ static enum drive_status open_remote(void *object, const struct drive_configurat
     }
     enum drive_status status = self->open(object, configuration);
     // What came while it was set up is not the measurement's.
-    bus_watch_start(can_bus_watch(&self->bus), self->master.period_us, (uint16_t)(0x280 + self->master.options.node_id));
+    bus_watch_start(can_bus_watch(&self->bus), self->master.period_us,
+                    (uint16_t)(0x280 + self->master.options.node_id));
     return status;
 }
 
@@ -48,6 +49,16 @@ static void close_remote(void *object)
     real_time_leave(&self->rights);
 }
 
+static int refuse_profile(const char *name, struct error *out_error)
+{
+    char names[200] = "";
+    for (size_t i = 0; cia402_profiles[i]; i++) {
+        size_t used = strlen(names);
+        snprintf(&names[used], sizeof names - used, "%s%s", i == 0 ? "" : ", ", cia402_profiles[i]->name);
+    }
+    return error_set(out_error, error_usage, "--drive: profile=%s: expected one of %s", name, names);
+}
+
 static int open_bus(const struct door_scheme *scheme, const char *rest, struct door *out_door, struct error *out_error)
 {
     struct door_query query;
@@ -56,11 +67,15 @@ static int open_bus(const struct door_scheme *scheme, const char *rest, struct d
     if (status) {
         return status;
     }
+    struct cia402_master_options options = cia402_master_defaults();
+    options.profile = query.profile[0] == '\0' ? NULL : cia402_profile_find(query.profile);
+    if (query.profile[0] != '\0' && !options.profile) {
+        return refuse_profile(query.profile, out_error);
+    }
     struct remote_drive *self = calloc(1, sizeof *self);
     if (!self) {
         return error_set(out_error, error_refused, "out of memory");
     }
-    struct cia402_master_options options = cia402_master_defaults();
     options.node_id = (uint8_t)query.node;
     options.bitrate = (uint32_t)query.bitrate;
     snprintf(name, sizeof name, "%s%s", scheme == &door_slcan ? scheme->prefix : "", query.address);
@@ -77,7 +92,9 @@ static int open_bus(const struct door_scheme *scheme, const char *rest, struct d
     self->close = self->operations.close;
     self->operations.open = open_remote;
     self->operations.close = close_remote;
-    *out_door = (struct door){.drive = {.operations = &self->operations, .self = self}, .owner = self, .patience_s = fmax(patience_s, self->sync_timeout_s)};
+    *out_door = (struct door){.drive = {.operations = &self->operations, .self = self},
+                              .owner = self,
+                              .patience_s = fmax(patience_s, self->sync_timeout_s)};
     return 0;
 }
 
@@ -131,6 +148,9 @@ static void free_bus(struct door *door)
 const struct door_scheme door_can = {
     .prefix = "can:",
     .form = "can:IFACE?node=N",
+    .node_default = 5,
+    .node_lowest = 1,
+    .node_highest = 127,
     .open = open_interface,
     .read_statistics = read_statistics,
     .free = free_bus,
@@ -139,6 +159,9 @@ const struct door_scheme door_can = {
 const struct door_scheme door_slcan = {
     .prefix = "slcan:",
     .form = "slcan:HOST:PORT?node=N",
+    .node_default = 5,
+    .node_lowest = 1,
+    .node_highest = 127,
     .open = open_adapter,
     .read_statistics = read_statistics,
     .free = free_bus,

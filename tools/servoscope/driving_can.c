@@ -169,7 +169,9 @@ int driving_can(const struct driving_request *request, const char *name, struct 
     }
     const uint32_t bitrate = 1000000; // of somebody else's adapter
     int status = fault_list_read(request->faults, &self->faults, model, out_error);
-    status = status ? status : can_bus_open(&self->bus, name, "--can", can_bus_drive, (uint8_t)request->node, bitrate, out_error);
+    status = status
+                 ? status
+                 : can_bus_open(&self->bus, name, "--can", can_bus_drive, (uint8_t)request->node, bitrate, out_error);
     if (!status) {
         status = run_drive(self, request, name, model, context, out_error);
         can_bus_close(&self->bus);

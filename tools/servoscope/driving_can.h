@@ -10,11 +10,11 @@
 /// What the options of `drive` say, whatever the bus.
 struct driving_request {
     long long node;
-    double for_s;       ///< 0: until a signal comes
-    const char *faults; ///< NULL: none
-    double period_tolerance;      ///< of the drive's look at the SYNC's spacing; 0: it does not look
-    double latch_us, reply_us;    ///< SYNC to sample, sample to its answer
-    double drift_ppm;             ///< of the drive's own clock
+    double for_s;              ///< 0: until a signal comes
+    const char *faults;        ///< NULL: none
+    double period_tolerance;   ///< of the drive's look at the SYNC's spacing; 0: it does not look
+    double latch_us, reply_us; ///< SYNC to sample, sample to its answer
+    double drift_ppm;          ///< of the drive's own clock
 };
 
 /// Serves the drive as a CiA 402 node on the bus `name` (can_bus.h) until a signal or the time ends it; says on

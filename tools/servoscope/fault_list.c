@@ -144,7 +144,8 @@ static int read_drive_fault(struct fault_list *list, enum simulated_fault_kind k
                             const char *text, struct error *out_error)
 {
     const struct form *form = &drive_forms[kind];
-    unsigned long sync = 0, count = form->most > 1 ? 0 : 1;
+    const bool passes = kind == simulated_fault_sync_missed || kind == simulated_fault_silent;
+    unsigned long sync = 0, count = passes ? 1 : 0; // an encoder that breaks stays broken
     bool good = entry->count >= form->least && entry->count <= form->most &&
                 read_whole(entry->fields[0], 1, UINT32_MAX, &sync) &&
                 (entry->count < 2 || read_whole(entry->fields[1], 0, UINT32_MAX, &count)) &&

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/// The text of `drive --faults`: what is to go wrong, separated by commas. Frames are counted from 1 for each COB-ID (in
-/// hexadecimal, or "any"), both ways; SYNCs are counted in operation enabled, a count of 0 is for ever.
+/// The text of `drive --faults`: what is to go wrong, separated by commas. Frames are counted from 1 for each COB-ID
+/// (in hexadecimal, or "any"), both ways; SYNCs are counted in operation enabled. Without a COUNT frames, SYNCs and
+/// silence are missing once, an encoder stays broken; a COUNT of 0 is for ever.
 ///   drop:ID:N[:COUNT]  duplicate:ID:N  swap:ID:N  shorten:ID:N  delay:ID:N:US  corrupt:ID:N:BYTE:MASK  bus-off:ID:N:US
 ///   encoder-stuck:SYNC[:COUNT]  encoder-reversed:SYNC[:COUNT]  encoder-dead:SYNC[:COUNT]  sync-missed:SYNC[:COUNT]
 ///   silent:SYNC[:COUNT]  heartbeat-stops:SYNC  reset:SYNC  end-stop:POSITION

@@ -101,15 +101,17 @@ static void print_histogram(const char *what, const struct bus_histogram *histog
 
 static void print_real_time(const struct door_statistics *bus)
 {
-    printf("  bus: %u bits per cycle x %g Hz / %.3g Mbit/s = load %.0f %%; %lu frames, %lu not sent, %lu lost on arrival, "
-           "%lu error frames; %lu set-points clipped\n",
-           bus->cycle_bits, bus->rate_hz, 1e-6 * bus->bitrate, 100.0 * bus->bus_load, (unsigned long)bus->frames,
-           (unsigned long)bus->frames_unsent, (unsigned long)bus->frames_lost, (unsigned long)bus->error_frames,
-           (unsigned long)bus->setpoints_clipped);
-    printf("  real time: %s; %lu SYNCs late by more than half a period\n", bus->rights,
-           (unsigned long)bus->syncs_late);
-    print_histogram("SYNC off its spacing", &bus->spacing);
-    print_histogram("SYNC to answer", &bus->reply);
+    printf(
+        "  bus: %u bits per cycle x %g Hz / %.3g Mbit/s = load %.0f %%; %lu frames, %lu not sent, %lu lost on arrival, "
+        "%lu error frames; %lu set-points clipped\n",
+        bus->cycle_bits, bus->rate_hz, 1e-6 * bus->bitrate, 100.0 * bus->bus_load, (unsigned long)bus->frames,
+        (unsigned long)bus->frames_unsent, (unsigned long)bus->frames_lost, (unsigned long)bus->error_frames,
+        (unsigned long)bus->setpoints_clipped);
+    printf("  real time: %s; %lu SYNCs late by more than half a period\n", bus->rights, (unsigned long)bus->syncs_late);
+    if (bus->spacing.count > 0) { // a protocol without SYNC has none
+        print_histogram("SYNC off its spacing", &bus->spacing);
+        print_histogram("SYNC to answer", &bus->reply);
+    }
 }
 
 void measured_print_bus(const struct door *door)
