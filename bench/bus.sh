@@ -16,6 +16,14 @@ echo '{"structure": "rigid", "motor_inertia_kgm2": 0.005, "sample_rate_hz": 1000
 "$SERVOSCOPE" design --rate 1000 --period 1000 --lines linear:1:300:1 --limit-torque 1 --inertia 0.005 --method newman \
     --out table --quiet
 
+settle() { # settle FILE: until it has not grown for two seconds
+    local before=-1
+    while [ "$before" -ne "$(stat -c %s "$1")" ]; do
+        before=$(stat -c %s "$1")
+        sleep 2
+    done
+}
+
 echo "streaming at 1 kHz for $seconds s over vcan0"
 "$SERVOSCOPE" drive --model model.json --can vcan0 >drive.txt &
 drive=$!
@@ -60,7 +68,7 @@ sleep 0.5
 candump -L vcan0,585:7FF >answers.txt &
 dump=$!
 cangen vcan0 -g 0 -I 605 -L 8 -D 4041600000000000 -n 5000 -i
-sleep 1
+settle answers.txt
 kill -INT "$drive"
 wait "$drive" || true
 kill "$dump"
@@ -80,7 +88,7 @@ candump -L vcan0 >all.txt &
 dump=$!
 sleep 0.3
 cangen vcan0 -g 0 -I 605 -L 8 -D 4041600000000000 -n 5000 -i
-sleep 1
+settle all.txt
 kill "$dump"
 wait "$dump" 2>/dev/null || true
 python3 - <<'PYTHON'

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /// Modbus on the host, TCP and RTU, as drivers/modbus/link.h: the one file that knows libmodbus.
-/// Nothing waits for ever: an exchange takes at most the response time plus the time of 260 bytes with a gap before each,
-/// a settle at most settle_ms (TCP: one connection attempt).
+/// Nothing waits for ever: an exchange takes at most the response time plus the time of 260 bytes with a gap before
+/// each, a settle at most settle_ms (TCP: one connection attempt).
 #ifndef SERVOSCOPE_PORTS_MODBUS_HOST_H
 #define SERVOSCOPE_PORTS_MODBUS_HOST_H
 

@@ -288,7 +288,8 @@ static bool targets_pass(const struct canopen_node *self, const struct pdo *last
            (last->length < 2 || last->data[last->length - 2] == counter);
 }
 
-/// Puts the set-points received before this SYNC in force, all or none.
+/// Puts the set-points received before this SYNC in force, all or none where they carry a check. False unless all are
+/// there and good.
 static bool take_targets(struct canopen_node *self, uint8_t counter)
 {
     const struct pdo *last = NULL;
@@ -304,10 +305,12 @@ static bool take_targets(struct canopen_node *self, uint8_t counter)
         self->errors.targets_lost++;
     else if (!fresh)
         self->errors.targets_rejected++;
+    // Without a check there is no set to speak of: many masters send a control word only when it changes.
+    bool as_they_come = last == NULL || !ends_with(last, pdo_check_target_index, 2);
     for (struct pdo *pdo = self->rpdo; pdo < &self->rpdo[pdo_per_direction]; pdo++) {
         if (!pdo_is_synchronous(pdo) || !pdo->pending)
             continue;
-        if (fresh)
+        if (fresh || as_they_come)
             self->errors.values_refused += pdo_apply(pdo);
         pdo->pending = pdo->mixed = false;
     }

@@ -23,7 +23,8 @@
 /// What the application does; every function must be there.
 struct canopen_node_events {
     /// One SYNC: mapped objects hold the set-points. targets_fresh is false if a synchronous RPDO was missing, was
-    /// meant for another SYNC or failed its check: then the objects still hold what they held before.
+    /// meant for another SYNC or failed its check: then, where they carry a check (2002), the objects still hold what
+    /// they held before, and otherwise what has come.
     void (*synchronise)(void *owner, uint64_t now_us, bool targets_fresh);
     /// SYNC (1.5 periods) or the master's heartbeat is missing, or NMT left operational; the code to report if it
     /// matters.

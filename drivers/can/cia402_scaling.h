@@ -35,7 +35,8 @@ struct cia402_scaling {
 };
 
 /// Reads the units; NULL, or what is missing or inconsistent as one clause.
-/// Equation: position 2 pi revolutions / increments or the SI unit; velocity the SI unit; torque 6076 / 1000 / torque units
+/// Equation: position 2 pi revolutions / increments or the SI unit; velocity the SI unit; torque 6076 / 1000 / torque
+///           units
 const char *cia402_scaling_read(const struct cia402_scaling_objects *objects, struct cia402_scaling *out_scaling);
 
 /// value / unit, rounded to the nearest whole number (halves away from zero), clipped to minimum..maximum.

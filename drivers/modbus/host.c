@@ -165,8 +165,7 @@ static enum modbus_host_status read_identity(struct modbus_host *self, uint16_t 
     return status;
 }
 
-enum modbus_host_status modbus_host_open(struct modbus_host *self, const struct modbus_link *link,
-                                         uint16_t first_nonce)
+enum modbus_host_status modbus_host_open(struct modbus_host *self, const struct modbus_link *link, uint16_t first_nonce)
 {
     memset(self, 0, sizeof *self);
     self->link = link;
@@ -181,8 +180,8 @@ enum modbus_host_status modbus_host_open(struct modbus_host *self, const struct 
         snprintf(self->detail, sizeof self->detail,
                  "%s: registers 0..5 are %04X %04X %04X %04X %04X %04X, expected 4D53 01xx 0102 0304 3F80 0000 "
                  "(a drive with servoscope's map, high word first)",
-                 link->name(link->self), (unsigned)words[0], (unsigned)words[1], (unsigned)words[2],
-                 (unsigned)words[3], (unsigned)words[4], (unsigned)words[5]);
+                 link->name(link->self), (unsigned)words[0], (unsigned)words[1], (unsigned)words[2], (unsigned)words[3],
+                 (unsigned)words[4], (unsigned)words[5]);
         return modbus_host_identity;
     }
     const struct modbus_host_identity identity = {
@@ -459,7 +458,8 @@ const char *modbus_result_str(uint32_t result)
 
 const char *modbus_state_str(uint32_t state)
 {
-    static const char *const names[] = {"idle", "uploading", "verified", "armed", "settling", "running", "done", "stopping"};
+    static const char *const names[] = {"idle",     "uploading", "verified", "armed",
+                                        "settling", "running",   "done",     "stopping"};
     if (state == modbus_state_fault) {
         return "fault";
     }

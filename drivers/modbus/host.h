@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /// The host's side of the register map: the layer that makes an answer trustworthy, and what a measurement asks for.
 ///
-/// A Modbus RTU reply does not say which request it answers, and libraries take a late one for the next (docs/modbus.md,
-/// "Late replies"). So nothing is believed that does not prove itself:
+/// A Modbus RTU reply does not say which request it answers, and libraries take a late one for the next
+/// (docs/modbus.md, "Late replies"). So nothing is believed that does not prove itself:
 ///   state and setup   read together with a number that the same request has just written (NONCE)
 ///   a write of setup  read back with it
 ///   a command         its sequence number comes back in COMMAND_ACK, with its result

@@ -355,9 +355,9 @@ static uint16_t spectrum_word(const struct modbus_map *self, uint32_t word)
         return 0;
     }
     const struct modbus_record *record = &self->config.snapshot[value(self, modbus_field_read_first) + index / words];
-    const float numbers[] = {record->input[0],       record->input[1],        record->output[0],
-                             record->output[1],      record->input_variance,  record->output_variance,
-                             record->covariance[0],  record->covariance[1]};
+    const float numbers[] = {record->input[0],      record->input[1],       record->output[0],
+                             record->output[1],     record->input_variance, record->output_variance,
+                             record->covariance[0], record->covariance[1]};
     return half(bits_of(numbers[index % words / 2u]), index % 2u);
 }
 
@@ -407,7 +407,8 @@ static uint16_t word_of(const struct modbus_map *self, uint32_t field, uint32_t 
 static uint32_t field_at(uint32_t address, uint32_t from)
 {
     uint32_t field = from;
-    while (field < modbus_field_count && address >= (uint32_t)modbus_fields[field].address + modbus_fields[field].words) {
+    while (field < modbus_field_count &&
+           address >= (uint32_t)modbus_fields[field].address + modbus_fields[field].words) {
         ++field;
     }
     return field < modbus_field_count && address >= modbus_fields[field].address ? field : modbus_field_count;
@@ -533,8 +534,7 @@ static enum modbus_exception react(struct modbus_map *self, uint32_t field)
     return modbus_exception_none;
 }
 
-enum modbus_exception modbus_map_write(struct modbus_map *self, uint32_t address, uint32_t count,
-                                       const uint16_t *words)
+enum modbus_exception modbus_map_write(struct modbus_map *self, uint32_t address, uint32_t count, const uint16_t *words)
 {
     if (count == 0) {
         return modbus_exception_value;

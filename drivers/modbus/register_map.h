@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/// The registers behind a Modbus slave, whatever carries them: reads, writes, the command state machine, the upload of a
-/// table, snapshots of spectra. No I/O, no clock, no heap; firmware and the simulated drive use it alike.
+/// The registers behind a Modbus slave, whatever carries them: reads, writes, the command state machine, the upload of
+/// a table, snapshots of spectra. No I/O, no clock, no heap; firmware and the simulated drive use it alike.
 ///
 /// Reads have no side effect. A write is taken whole or not at all. Every request may be repeated: a table chunk brings
 /// its own offset, a command its sequence number, a snapshot too.
 ///
 ///     command      in state                                   goes to
 ///     OPEN_UPLOAD  idle, uploading, verified, done            uploading
-///     VERIFY       idle, uploading, verified, done            verified (or stays, RESULT says why; from done: uploading)
+///     VERIFY       idle, uploading, verified, done            verified (or stays, RESULT says why; from done:
+///     uploading)
 ///     ARM          verified                                   armed: under torque at standstill
 ///     START        armed                                      settling, running, stopping, done
 ///     STOP         armed / settling, running, stopping        verified / stopping, done

@@ -18,16 +18,16 @@ enum {
     modbus_key = 0xA5A5,             ///< what ARM and START need in the same write
 
     modbus_read_words_max = 125,
-    modbus_write_words_max = 123,            ///< of function 16
-    modbus_write_in_read_write_max = 121,    ///< of function 23
-    modbus_chunk_words = 120,                ///< of a table in one write, behind its offset
-    modbus_bin_window = 120,                 ///< bins in one read
-    modbus_spectrum_head_words = 8,          ///< of the spectrum's window
-    modbus_mean_words = 16,                  ///< of one bin: means, variances, covariance
-    modbus_period_words = 8,                 ///< of one bin: one period
-    modbus_mean_bins = 7,                    ///< in one window
-    modbus_period_bins = 14,                 ///< in one window
-    modbus_spectrum_words = 8 + 7 * 16,      ///< of the window
+    modbus_write_words_max = 123,         ///< of function 16
+    modbus_write_in_read_write_max = 121, ///< of function 23
+    modbus_chunk_words = 120,             ///< of a table in one write, behind its offset
+    modbus_bin_window = 120,              ///< bins in one read
+    modbus_spectrum_head_words = 8,       ///< of the spectrum's window
+    modbus_mean_words = 16,               ///< of one bin: means, variances, covariance
+    modbus_period_words = 8,              ///< of one bin: one period
+    modbus_mean_bins = 7,                 ///< in one window
+    modbus_period_bins = 14,              ///< in one window
+    modbus_spectrum_words = 8 + 7 * 16,   ///< of the window
 };
 
 /// Value of READ_PERIOD for means over all valid periods.

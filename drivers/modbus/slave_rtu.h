@@ -38,8 +38,8 @@ struct modbus_rtu_slave {
 void modbus_rtu_slave_init(struct modbus_rtu_slave *self, struct modbus_map *map, uint8_t address,
                            struct modbus_rtu_timing timing);
 
-/// Takes one byte that arrived at now_us. Call modbus_rtu_slave_poll() with the same time before it, or a frame that has
-/// ended in between is lost.
+/// Takes one byte that arrived at now_us. Call modbus_rtu_slave_poll() with the same time before it, or a frame that
+/// has ended in between is lost.
 void modbus_rtu_slave_byte(struct modbus_rtu_slave *self, uint8_t byte, uint64_t now_us);
 
 /// Whether the silence since the last byte has ended a frame; then answers it.
@@ -47,7 +47,6 @@ void modbus_rtu_slave_byte(struct modbus_rtu_slave *self, uint8_t byte, uint64_t
 uint32_t modbus_rtu_slave_poll(struct modbus_rtu_slave *self, uint64_t now_us, uint8_t *out_reply);
 
 /// Answers a whole frame, for ports that find the ends of frames themselves.
-uint32_t modbus_rtu_slave_frame(struct modbus_rtu_slave *self, const uint8_t *frame, uint32_t size,
-                                uint8_t *out_reply);
+uint32_t modbus_rtu_slave_frame(struct modbus_rtu_slave *self, const uint8_t *frame, uint32_t size, uint8_t *out_reply);
 
 #endif

@@ -14,7 +14,7 @@ struct modbus_tcp_slave {
     struct modbus_map *map;
     uint8_t frame[modbus_tcp_frame_max];
     uint32_t size;
-    bool broken;    ///< what came is no Modbus TCP: close the connection
+    bool broken;      ///< what came is no Modbus TCP: close the connection
     bool has_written; ///< the last frame answered was one that writes
     uint32_t answered;
 };

@@ -43,8 +43,8 @@ static enum core_status prepare_transform(struct table_player *self, const struc
     for (uint32_t b = 0; b < table->bin_count; ++b) {
         storage->bins[b] = msgen_table_bin(table, b);
     }
-    enum core_status status = frf_twiddles_build_f32(storage->twiddles, 2u * storage->samples_max,
-                                                     table->period_samples, &self->twiddles);
+    enum core_status status =
+        frf_twiddles_build_f32(storage->twiddles, 2u * storage->samples_max, table->period_samples, &self->twiddles);
     if (status != core_ok) {
         return status;
     }
@@ -295,7 +295,8 @@ static uint32_t spectrum(const void *object, uint32_t period, struct modbus_reco
 
 struct modbus_device table_player_device(struct table_player *self)
 {
-    const struct modbus_device device = {self, prepare, arm, ask_start, ask_stop, ask_abort, clear, alive, report, spectrum};
+    const struct modbus_device device = {self,      prepare, arm,   ask_start, ask_stop,
+                                         ask_abort, clear,   alive, report,    spectrum};
     return device;
 }
 
@@ -392,11 +393,10 @@ static void next_of_table(struct table_player *self, struct table_player_setpoin
     move_on(self);
     self->samples_played = core_count_up(self->samples_played);
     bool ended = self->place.phase == msgen_phase_done;
-    out_setpoint->control = ended ? table_player_quick_stop
+    out_setpoint->control = ended                   ? table_player_quick_stop
                             : self->setup.mode == 0 ? table_player_cascade
                                                     : table_player_torque;
-    out_setpoint->torque =
-        (double)guard_real_clip_torque(&self->guard, (core_real)values[msgen_channel_torque]);
+    out_setpoint->torque = (double)guard_real_clip_torque(&self->guard, (core_real)values[msgen_channel_torque]);
     out_setpoint->velocity = values[msgen_channel_velocity];
     out_setpoint->position = self->origin + values[msgen_channel_position];
 }

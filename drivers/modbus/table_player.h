@@ -7,8 +7,8 @@
 /// what was measured at the instant from which that set-point holds. The main loop calls table_player_collect() at
 /// least once per period; the register map's calls belong to the main loop too.
 ///
-/// Counted periods begin after the settling ones. A period with an invalid sample does not count; a trip, a stop and the
-/// fades leave a period unfinished, which counts for nothing.
+/// Counted periods begin after the settling ones. A period with an invalid sample does not count; a trip, a stop and
+/// the fades leave a period unfinished, which counts for nothing.
 #ifndef SERVOSCOPE_DRIVERS_MODBUS_TABLE_PLAYER_H
 #define SERVOSCOPE_DRIVERS_MODBUS_TABLE_PLAYER_H
 
@@ -39,12 +39,12 @@ struct table_player_sample {
 /// Memory for tables of up to samples_max samples and bins_max bins; must outlive the player.
 struct table_player_storage {
     uint32_t samples_max, bins_max, periods_kept;
-    float *twiddles;               ///< 2 * samples_max
-    uint32_t *bins;                ///< bins_max
-    union frf_word *transform;     ///< FRF_STORAGE_WORDS(bins_max, table_player_channels)
-    struct frf_pair *pairs;        ///< bins_max
-    struct frf_complex *kept;      ///< 2 * bins_max * periods_kept: input and output of each bin
-    uint32_t *kept_reasons;        ///< periods_kept
+    float *twiddles;           ///< 2 * samples_max
+    uint32_t *bins;            ///< bins_max
+    union frf_word *transform; ///< FRF_STORAGE_WORDS(bins_max, table_player_channels)
+    struct frf_pair *pairs;    ///< bins_max
+    struct frf_complex *kept;  ///< 2 * bins_max * periods_kept: input and output of each bin
+    uint32_t *kept_reasons;    ///< periods_kept
 };
 
 /// Read-only for the application.
@@ -66,12 +66,12 @@ struct table_player {
     struct msgen_player_state place; ///< of the set-point that is being controlled with
     struct table_player_setpoint setpoint;
     struct table_player_sample last;
-    double origin;              ///< position when it was armed
-    float trip_value;           ///< what broke a limit last
-    bool feeding;               ///< the sample belongs to a counted period
-    uint32_t samples_played;    ///< since START
-    uint32_t quick_stop_left;   ///< samples of a quick stop that are still to come
-    uint32_t collected;         ///< periods that were looked at
+    double origin;            ///< position when it was armed
+    float trip_value;         ///< what broke a limit last
+    bool feeding;             ///< the sample belongs to a counted period
+    uint32_t samples_played;  ///< since START
+    uint32_t quick_stop_left; ///< samples of a quick stop that are still to come
+    uint32_t collected;       ///< periods that were looked at
     volatile uint32_t cycles_max;
 };
 
@@ -82,7 +82,7 @@ extern const double table_player_quick_stop_s;
 extern const double table_player_rest_s;
 
 /// At rest, without a table. Errors: core_err_argument
-/// Test: tests/api/test_modbus_drive.c
+/// Test: tests/unit/test_modbus_player.c
 enum core_status table_player_init(struct table_player *self, const struct table_player_storage *storage);
 
 /// What a register map calls.

@@ -97,18 +97,18 @@ static double own_part(const struct beside *self, const double *column, double *
 
 double beside_cost(const struct beside *self, const double *columns, size_t count, double *out_sizes)
 {
-    double *first = self->work, *second = first + self->length, length = 0.0;
+    double *first = self->work, *second = first + self->length;
     double aa = own_part(self, columns, first), a = vector_dot(self->length, first, self->rest);
     out_sizes[0] = aa > 0.0 ? a / aa : 0.0;
     double gain = aa > 0.0 ? a * a / aa : 0.0;
     if (count == 2) {
         out_sizes[1] = 0.0;
-        length = own_part(self, columns + self->rows, second);
+        double length = own_part(self, columns + self->rows, second);
         double shared = aa > 0.0 ? vector_dot(self->length, first, second) / aa : 0.0;
         for (size_t j = 0; j < self->length; j++)
             second[j] -= shared * first[j];
         double bb = vector_dot(self->length, second, second), b = vector_dot(self->length, second, self->rest);
-        if (bb > own_least * length) {
+        if (length > 0.0 && bb > own_least * length) {
             out_sizes[1] = b / bb;
             out_sizes[0] -= shared * out_sizes[1];
             gain += b * b / bb;

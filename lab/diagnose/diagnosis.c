@@ -455,6 +455,24 @@ static bool refit_given(struct work *w, struct diagnosis *d, struct hypothesis *
     return true;
 }
 
+/// Estimates the noise and fits with it until neither changes the other. A name that is new was fitted with the noise of
+/// a model without it; what that is off by is not worth another name.
+static bool settle_noise(struct work *w, struct hypothesis *h, struct sim_model *io_model)
+{
+    enum { most = 4 };
+    const double settled = 0.01; // of the residuals' number
+    for (int pass = 0; pass < most; pass++) {
+        if (!estimate_fit_noise(w, io_model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations))
+            return false;
+        double before = fit_cost(&w->fit, &w->fit_data, h, h->x);
+        if (!w->evidence[0].recording->periodic || !fit_run(&w->fit, &w->fit_data, h, refit_iterations) ||
+            !(before - w->fit.cost > settled * (double)w->fit_data.values))
+            break;
+        hypothesis_model(h, NULL, io_model);
+    }
+    return true;
+}
+
 /// Refits the given structure, then searches; the noise is estimated anew under every better model, because a wrong
 /// model's errors scatter with the motion and would pass for noise.
 static bool find_causes(const struct diagnosis_request *request, struct work *w, struct diagnosis *d,
@@ -471,8 +489,7 @@ static bool find_causes(const struct diagnosis_request *request, struct work *w,
     struct search_options options = {.causes_max = 6, .progress = request->progress, .user = request->user};
     for (size_t pass = 0; pass < 2 * options.causes_max; pass++) {
         struct hypothesis before = *h;
-        if ((pass > 0 && !refine_gain(w, d, h, &step)) || !estimate_fit_noise(w, &model) ||
-            !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations) ||
+        if ((pass > 0 && !refine_gain(w, d, h, &step)) || !settle_noise(w, h, &model) ||
             !search_run(&w->fit_data, &w->recordings[0].coverage, &options, h, &w->fit))
             return false;
         hypothesis_model(h, NULL, &model);

@@ -101,6 +101,22 @@ double search_evidence(const struct fit_data *data, const struct hypothesis *hyp
     return 0.5 * (cost - fit->cost);
 }
 
+/// What an effect has to gain beside a hypothesis. One that acts on what another named effect brought, as a gap in a
+/// belt that the given model does not have, also has to gain a share of what that one does: by so much the parts of a
+/// new structure are never right.
+static double needed_nats(const struct fit_data *data, const struct hypothesis *h, const struct fit *fit, int effect)
+{
+    const double share = 0.05;
+    const struct sim_effect *e = sim_effects[effect];
+    double needed = search_threshold(data, effect), misfit = fmax(fit->cost / (double)data->values, 1.0);
+    if (!e->applies || e->applies(h->given))
+        return needed;
+    for (int parent = 0; sim_effects[parent]; parent++)
+        if (h->named[parent] && sim_effects[parent]->engage)
+            needed = fmax(needed, share * search_evidence(data, h, fit, parent) / misfit);
+    return needed;
+}
+
 // ---- Adding
 
 /// Cost at which a candidate would gain `nats` over a fit.
@@ -129,34 +145,55 @@ static size_t scan_all(const struct fit_data *data, const struct sim_coverage *c
     return count;
 }
 
+/// Whether a candidate is to be preferred to the best so far (NULL: none). What a model leaves that is nowhere near
+/// noise has no likelihood worth its digits, so that of two that both leave far more, and gain nearly alike, the simpler
+/// one is taken: the noise estimated under it says the rest.
+static bool is_preferred(const struct fit_data *data, const struct scan_candidate *candidate, double margin,
+                         const struct scan_candidate *best, double best_margin)
+{
+    const double far = 3.0, alike = 0.7;
+    if (!best)
+        return margin > 0.0;
+    double least = far * (double)data->values;
+    size_t parameters = sim_effects[candidate->effect]->parameter_count,
+           best_parameters = sim_effects[best->effect]->parameter_count;
+    if (parameters != best_parameters && fmin(candidate->cost, best->cost) > least)
+        return parameters < best_parameters ? margin > alike * best_margin : alike * margin > best_margin;
+    return margin > best_margin;
+}
+
 /// One round of forward selection. Returns whether an effect was added.
 static bool add_best(const struct fit_data *data, const struct sim_coverage *coverage, struct hypothesis *io_h,
                      struct fit *fit)
 {
     struct scan_candidate *list = calloc(sim_effects_max, sizeof *list);
     struct fit scratch = {0};
-    double best = 0.0;
+    const struct scan_candidate *best = NULL;
+    double best_margin = 0.0;
     if (list && fit_init(&scratch, data)) {
-        size_t count = scan_all(data, coverage, io_h, fit, list), chosen = count;
+        size_t count = scan_all(data, coverage, io_h, fit, list);
         for (size_t i = 0; i < count && i < refined_candidates; i++) {
-            double needed = search_threshold(data, list[i].effect);
-            double goal = cost_for(data, fit->cost, needed + best);
+            double needed = needed_nats(data, io_h, fit, list[i].effect);
+            double goal = cost_for(data, fit->cost, needed + 0.5 * best_margin);
             fit_roughly(&scratch, data, io_h, fit, &list[i].hypothesis, refine_iterations, goal);
-            double gain = scaled_gain(data, fit->cost, scratch.cost) - needed;
-            if (gain > best && can_show(&list[i].hypothesis, coverage, list[i].effect)) {
-                best = gain;
-                chosen = i;
+            double margin = scaled_gain(data, fit->cost, scratch.cost) - needed;
+            list[i].cost = scratch.cost;
+            if (is_preferred(data, &list[i], margin, best, best_margin) &&
+                can_show(&list[i].hypothesis, coverage, list[i].effect)) {
+                best_margin = margin;
+                best = &list[i];
             }
         }
-        if (chosen < count) {
-            *io_h = list[chosen].hypothesis;
+        if (best) {
+            *io_h = best->hypothesis;
             fit_run(fit, data, io_h, refine_iterations);
             remember(data, io_h, fit->cost);
         }
     }
+    bool added = best != NULL;
     fit_free(&scratch);
     free(list);
-    return best > 0.0;
+    return added;
 }
 
 bool search_add(const struct fit_data *data, const struct sim_coverage *coverage, int effect, const struct fit *fit,
@@ -187,7 +224,7 @@ static bool drop_weakest(const struct fit_data *data, struct hypothesis *io_h, s
     for (int e = 0; sim_effects[e]; e++) {
         if (!io_h->named[e])
             continue;
-        double margin = search_evidence(data, io_h, fit, e) / misfit - search_threshold(data, e);
+        double margin = search_evidence(data, io_h, fit, e) / misfit - needed_nats(data, io_h, fit, e);
         if (margin < least) {
             least = margin;
             weakest = e;
@@ -244,6 +281,61 @@ static void place_named_again(const struct fit_data *data, const struct sim_cove
             place_again(data, coverage, e, io_h, io_fit);
 }
 
+// ---- One for two
+
+/// Looks for one effect that does as well as two that are named together, with what the second costs granted. `without`
+/// has neither, `base` belongs to it.
+static bool find_one_for(const struct fit_data *data, const struct sim_coverage *coverage,
+                         const struct hypothesis *without, const struct fit *base, double granted,
+                         struct hypothesis *io_h, struct fit *io_fit)
+{
+    const double hint = 0.5; // of what the two bring
+    struct fit trial = {0};
+    struct scan scan = {0};
+    bool found = false, good = fit_init(&trial, data) && scan_init(&scan, data, coverage, without, base);
+    double misfit = fmax(io_fit->cost / (double)data->values, 1.0);
+    for (int e = 0; good && sim_effects[e]; e++) {
+        struct scan_candidate one;
+        double goal = io_fit->cost + 2.0 * misfit * (granted - search_threshold(data, e));
+        if (io_h->named[e] || !hypothesis_may_name(without, e) || !(goal < base->cost) ||
+            !scan_effect(&scan, e, hint * (base->cost - goal), &one))
+            continue;
+        if (fit_roughly(&trial, data, without, base, &one.hypothesis, refine_iterations, goal) && trial.cost < goal &&
+            can_show(&one.hypothesis, coverage, e)) {
+            *io_h = one.hypothesis;
+            found = fit_run(io_fit, data, io_h, refine_iterations);
+            break;
+        }
+    }
+    scan_free(&scan);
+    fit_free(&trial);
+    return found;
+}
+
+/// A wrong name that came first may have needed another to make up for it. Returns whether one took the place of two.
+static bool merge_two(const struct fit_data *data, const struct sim_coverage *coverage, struct hypothesis *io_h,
+                      struct fit *io_fit)
+{
+    struct fit base;
+    bool merged = false;
+    if (!fit_init(&base, data))
+        return false;
+    for (int a = 0; sim_effects[a] && !merged; a++)
+        for (int b = a + 1; io_h->named[a] && sim_effects[b] && !merged; b++) {
+            struct hypothesis without = *io_h;
+            if (!io_h->named[b])
+                continue;
+            hypothesis_unname(&without, a);
+            if (without.named[b])
+                hypothesis_unname(&without, b);
+            double granted = search_threshold(data, a) + search_threshold(data, b);
+            merged = fit_run(&base, data, &without, refine_iterations) &&
+                     find_one_for(data, coverage, &without, &base, granted, io_h, io_fit);
+        }
+    fit_free(&base);
+    return merged;
+}
+
 static size_t named_count(const struct hypothesis *h)
 {
     size_t count = 0;
@@ -264,6 +356,8 @@ bool search_run(const struct fit_data *data, const struct sim_coverage *coverage
     if (named_count(io_hypothesis) < options->causes_max && add_best(data, coverage, io_hypothesis, io_fit)) {
         place_named_again(data, coverage, io_hypothesis, io_fit);
         drop_unneeded(data, io_hypothesis, io_fit);
+    } else if (merge_two(data, coverage, io_hypothesis, io_fit)) {
+        remember(data, io_hypothesis, io_fit->cost);
     }
     return true;
 }

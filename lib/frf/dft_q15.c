@@ -35,7 +35,7 @@ static void add_by_twos(struct frf_dft *self, const void *frames, uint32_t count
                                 self->channels};
         for (uint32_t c = 0; c < self->channels; ++c) {
             const int16_t *samples = (const int16_t *)frames + c;
-            add_part(sums, 1, twiddles->cosine, walk, samples, count, fresh);
+            (void)add_part(sums, 1, twiddles->cosine, walk, samples, count, fresh);
             bin->bins[b % 2u].index = (uint16_t)add_part(sums + 1, -1, twiddles->sine, walk, samples, count, fresh);
             sums += 2;
         }

@@ -82,6 +82,7 @@ const char *guard_cause_str(enum guard_cause cause)
         return "watchdog";
     case guard_cause_stuck:
         return "stuck";
+    default:
+        return "unknown cause";
     }
-    return "unknown cause";
 }

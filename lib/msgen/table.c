@@ -40,8 +40,9 @@ uint32_t msgen_format_bytes(enum msgen_format format)
     case msgen_format_i32:
     case msgen_format_f32:
         return 4;
+    default:
+        return 0;
     }
-    return 0;
 }
 
 uint32_t msgen_table_data_bytes(const struct msgen_table *self)

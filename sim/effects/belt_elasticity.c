@@ -29,13 +29,14 @@ static void elasticity_engage(struct sim_model *model)
 static bool elasticity_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index,
                             double *out)
 {
-    const double first = 0.125, growth = 1.25, damping_ratio = 0.03;
-    if (index >= sim_effect_scan_max)
+    const double first = 0.125, last = 4.0, growth = 1.12, damping_ratio = 0.03;
+    double share = first * pow(growth, (double)index);
+    if (index >= sim_effect_scan_max || share > last)
         return false;
     struct sim_model engaged = *model;
     elasticity_engage(&engaged);
     double inertia = series_inertia(&engaged);
-    double rate = turn * coverage->frequency_max_hz * first * pow(growth, (double)index);
+    double rate = turn * coverage->frequency_max_hz * share;
     if (index == 0 && model->structure == sim_structure_two_mass)
         rate = sqrt(model->belt_stiffness_Nm_per_rad / inertia); // the given one first
     out[0] = rate * rate * inertia;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /// The simulated drive behind Modbus registers: sim/belt_drive.h with the player in the drive. It has no clock: whoever
-/// serves it says how many samples have passed. Its sample rate is that of the table it was given, at first the model's.
+/// serves it says how many samples have passed. Its sample rate is that of the table it was given, at first the
+/// model's.
 #ifndef SERVOSCOPE_SIM_NODE_MODBUS_DRIVE_H
 #define SERVOSCOPE_SIM_NODE_MODBUS_DRIVE_H
 

@@ -374,7 +374,12 @@ void simulated_drive_init(struct simulated_drive *self, const struct sim_model *
     self->clock_rate = 1.0;
     self->period_tolerance = 0.25;
     const struct can_port delayed = {.operations = &delayed_operations, .self = self};
-    const struct canopen_node_identity identity = {.device_type = CIA402_SERVO_DRIVE, .product = 0x402, .revision = 1};
+    const struct canopen_node_identity identity = {.device_type = CIA402_SERVO_DRIVE,
+                                                   .product = 0x402,
+                                                   .revision = 1,
+                                                   .device_name = "servoscope simulated drive",
+                                                   .hardware_version = "model",
+                                                   .software_version = "1"};
     canopen_node_init(&self->node, node_id, &delayed, &identity, simulated_drive_entries, simulated_drive_entry_count,
                       &events, self);
     choose_units(self);

@@ -201,6 +201,18 @@ static void test_canopen_bus_transfer_ends_when_the_node_is_gone(void)
     TEST_ASSERT_TRUE(canopen_master_time_us(&master) - from_us <= 4 * sdo_timeout_us + 20000);
 }
 
+static void test_canopen_bus_stopped_node_drops_its_transfer(void)
+{
+    struct can_frame request = sdo_client_download_data(&master.sdo, sdo_segmented, 0x2100, 0, source, 100);
+    canopen_master_send(&master, &request);
+    serve_ms(1);
+    TEST_ASSERT_EQUAL(sdo_server_segment_download, app.node.sdo.state);
+    command(nmt_stop);
+    TEST_ASSERT_EQUAL(sdo_server_idle, app.node.sdo.state);
+    serve_ms(1 + sdo_server_timeout_us / 1000);
+    TEST_ASSERT_EQUAL_UINT32(0, app.node.sdo.timeouts); // a stopped node has nothing to say, not even an abort
+}
+
 // ---- Event-driven process data
 
 static void map_event(uint16_t inhibit_100us, uint16_t event_ms)
@@ -362,6 +374,7 @@ int main(void)
     RUN_TEST(test_canopen_bus_reads_the_strings);
     RUN_TEST(test_canopen_bus_transfer_survives_any_lost_frame);
     RUN_TEST(test_canopen_bus_transfer_ends_when_the_node_is_gone);
+    RUN_TEST(test_canopen_bus_stopped_node_drops_its_transfer);
     RUN_TEST(test_canopen_bus_event_tpdo_goes_out_on_start_and_on_change);
     RUN_TEST(test_canopen_bus_event_timer_repeats_and_inhibit_time_holds_back);
     RUN_TEST(test_canopen_bus_history_is_cleared_by_zero_only);

@@ -15,7 +15,7 @@ if [ "${1:-}" != inside ]; then
         exit 1
     fi
     export SERVOSCOPE=${SERVOSCOPE_OPTIMISED:-$SERVOSCOPE}
-    exec "$SERVOSCOPE_SOURCE/scripts/with-vcan" -t 300 bash "${BASH_SOURCE[0]}" inside
+    exec "$SERVOSCOPE_SOURCE/scripts/with-vcan" -t 550 bash "${BASH_SOURCE[0]}" inside
 fi
 subcommand=measure
 source "$SERVOSCOPE_SOURCE/tests/support/cli.sh"

@@ -18,6 +18,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 LATCH, GUARD, REAL = "lib/guard/latch.c", "lib/guard/guard.c", "lib/guard/guard_real.c"
 MOTION, OBJECTS, DRIVE = (f"sim/node/simulated_drive{part}.c" for part in ("_motion", "_objects", ""))
 MACHINE = "drivers/can/cia402.c"
+PLAYER, MODBUS = "drivers/modbus/table_player.c", "sim/node/modbus_drive.c"
 
 # name, file, text, instead of it
 MUTANTS = [
@@ -80,18 +81,29 @@ MUTANTS = [
     ("machine_reset_edge", MACHINE, "(control_word & 0x80) && !(self->control_word & 0x80)", "(control_word & 0x80)"),
     ("machine_latched", MACHINE, "[FA] = {FA, FA, FA, FA,", "[FA] = {FA, FA, FA, OE,"),
     ("machine_quick_stop_runs_out", MACHINE, "&& !stays_in_quick_stop(self))\n        return false;", "&& 0)\n        return false;"),
+    ("modbus_following", PLAYER, "!(error >= -allowed && error <= allowed)", "0"),
+    ("modbus_guard", PLAYER, "guard_real_step(&self->guard, &now) == guard_ramp_down && self->end", "0 && self->end"),
+    ("modbus_watchdog", PLAYER, "if (setup->host_timeout_ms > 0) {", "if (0) {"),
+    ("modbus_arm_outside", PLAYER, "guard_real_arm(&self->guard, &now) : status;", "(guard_real_arm(&self->guard, &now), core_ok) : status;"),
+    ("modbus_clip", PLAYER, "guard_real_clip_torque(&self->guard, (core_real)values[msgen_channel_torque])", "values[msgen_channel_torque]"),
+    ("modbus_end_stop", MODBUS, "if (self->drive.hit_end_stop && !had_hit)", "if (0)"),
+    ("modbus_rest", PLAYER, "const double table_player_rest_s = 0.5;", "const double table_player_rest_s = 0;"),
 ]
 
 GROUPS = {
     "guard": (["tests/unit/test_guard.c"], ["lib/guard", "lib/core"]),
     "drive": (["tests/unit/test_simulated_drive.c"], ["lib/core", "sim", "sim/effects", "sim/node", "drivers/can"]),
     "machine": (["tests/unit/test_cia402.c"], ["drivers/can"]),
+    "modbus": (["tests/unit/test_modbus_player.c"],
+               ["lib/core", "lib/msgen", "lib/frf", "lib/guard", "sim", "sim/effects", "sim/node", "drivers/modbus"]),
 }
 # The door's own half and other nodes need more than these tests do.
 LEFT_OUT = {"cia402_master.c", "cia402_setup.c", "cia402_profile.c", "canopen_master.c"}
 
 
 def group_of(file):
+    if file in (PLAYER, MODBUS):
+        return "modbus"
     return "guard" if file.startswith("lib/guard") else "machine" if file == MACHINE else "drive"
 
 
@@ -113,7 +125,8 @@ class Workshop:
             yield test
         for room in rooms:
             for path in sorted((ROOT / room).glob("*.c")):
-                node = room == "sim/node" and not path.name.startswith("simulated_drive")
+                own = "modbus_drive" if group == "modbus" else "simulated_drive"
+                node = room == "sim/node" and not path.name.startswith(own)
                 if path.name not in LEFT_OUT and not node:
                     yield str(path.relative_to(ROOT))
 
@@ -136,7 +149,7 @@ class Workshop:
             self.objects["unity"] = self.compile(pathlib.Path(self.unity) / "unity.c", "unity")
             self.objects["effects"] = self.compile(self.effects(), "effects_list")
         objects["unity"] = self.objects["unity"]
-        if group == "drive":
+        if group in ("drive", "modbus"):
             objects["effects"] = self.objects["effects"]
         return objects
 

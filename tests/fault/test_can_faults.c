@@ -432,6 +432,57 @@ static void test_can_faults_lost_heartbeat_of_master_stops_the_drive(void)
     TEST_ASSERT_EQUAL(cia402_fault, bench.node.machine.state);
 }
 
+// ---- A second master that streams
+
+static struct can_frame rogue_frame(int kind, int n)
+{
+    static const uint16_t ids[] = {0x205, 0x305, 0x080};
+    static const uint8_t lengths[] = {6, 8, 1};
+    struct can_frame frame = can_frame_make(ids[kind], lengths[kind]);
+    for (uint8_t i = 0; i < frame.length; i++)
+        frame.data[i] = (uint8_t)(37 * n + 11 * i);
+    if (kind == 0) { // a command to go on, to somewhere else
+        can_put(frame.data, 2, cia402_control_enable_operation);
+        can_put(&frame.data[2], 4, 100000);
+    }
+    return frame;
+}
+
+/// Set-points and SYNCs of somebody else among ours, at any time of a cycle: either this exchange's own set-point is in
+/// force, or the sample is not valid and counted.
+static void test_can_faults_second_streaming_master_is_not_obeyed(void)
+{
+    int rejected = 0;
+    for (int kind = 0; kind < 3; kind++)
+        for (uint64_t after_us = 0; after_us < 1000; after_us += 90) {
+            struct can_port rogue;
+            setUp();
+            snprintf(where, sizeof where, "rogue %d, %u us into the cycle", kind, (unsigned)after_us);
+            inproc_bus_add_port(&bench.bus, &rogue);
+            move(3);
+            enum drive_status status = drive_ok;
+            int lost = 0;
+            for (int n = 3; n < 20 && status == drive_ok; n++) {
+                struct drive_setpoint setpoint = setpoint_at(n);
+                struct drive_sample sample;
+                struct can_frame frame = rogue_frame(kind, n);
+                inproc_bus_run(&bench.bus, bench.bus.now_ns / 1000 + after_us % 500);
+                TEST_ASSERT_EQUAL(can_ok, rogue.operations->send(rogue.self, &frame));
+                status = bench.drive.operations->exchange(bench.drive.self, &setpoint, &sample);
+                lost += !sample.valid;
+                if (sample.valid)
+                    check_valid_sample(&setpoint);
+            }
+            TEST_ASSERT_EQUAL_UINT32_MESSAGE(lost, bench.master.counters.samples_lost, where);
+            rejected += lost;
+            bench.drive.operations->stop(bench.drive.self);
+            inproc_bus_run(&bench.bus, bench.bus.now_ns / 1000 + 400000);
+            TEST_ASSERT_FALSE_MESSAGE(cia402_machine_is_powered(&bench.node.machine), where);
+        }
+    printf("a second streaming master: %d samples not valid\n", rejected);
+    TEST_ASSERT_TRUE(rejected > 0);
+}
+
 static enum drive_status after_nmt(enum nmt_command command)
 {
     struct can_port rogue;
@@ -480,6 +531,7 @@ int main(void)
     RUN_TEST(test_can_faults_silent_master_stops_the_drive);
     RUN_TEST(test_can_faults_master_that_dies_at_any_sample_leaves_no_motion);
     RUN_TEST(test_can_faults_lost_heartbeat_of_master_stops_the_drive);
+    RUN_TEST(test_can_faults_second_streaming_master_is_not_obeyed);
     RUN_TEST(test_can_faults_node_reset_ends_the_run);
     RUN_TEST(test_can_faults_node_stopped_by_nmt_ends_the_run);
     return UNITY_END();

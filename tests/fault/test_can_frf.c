@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /// What a measurement over CAN is worth when something goes wrong at one place, at every place: the frequency response
-/// is the undisturbed one within its own uncertainty, or the measurement says that it is none. Lost samples are counted,
-/// as many as were injected, and cost exactly the period they are in. Everything in memory, on a virtual clock.
+/// is the undisturbed one within its own uncertainty, or the measurement says that it is none. Lost samples are
+/// counted, as many as were injected, and cost exactly the period they are in. All in memory, on a virtual clock.
 /// A failing case is printed as kind, frame or SYNC, and byte; the same arguments to case_on_bus() or case_in_drive()
 /// run it alone.
 #include "lab/estimate/circle.h"

@@ -95,7 +95,8 @@ class Drive:
 def connect(arguments):
     if arguments[0] == "tcp":
         return ModbusTcpClient(arguments[1], port=int(arguments[2]), timeout=2), arguments[3:]
-    return ModbusSerialClient(arguments[1], baudrate=115200, parity="E", timeout=2), arguments[2:]
+    # A pty has no parity, and pyserial insists on what it is told.
+    return ModbusSerialClient(arguments[1], baudrate=115200, parity="N", timeout=2), arguments[2:]
 
 
 def check_identity(drive):

@@ -233,49 +233,57 @@ static void feed_rtu(const uint8_t *data, uint32_t size, bool sound)
         FUZZ_CHECK(length >= 5 && reply[0] == slave_address && modbus_crc16(reply, length) == 0);
 }
 
+static void request(const struct fuzz_step *step)
+{
+    switch (step->what % 8) {
+    case 0:
+        ask(step->data, step->length);
+        break;
+    case 1:
+    case 2:
+        ask_read(step->data);
+        break;
+    case 3:
+    case 4:
+        ask_write(step->data);
+        break;
+    case 5:
+    case 6:
+        ask_both(step->data);
+        break;
+    default:
+        run_drive(step->data[0]);
+        break;
+    }
+}
+
+static void carry(const struct fuzz_step *step)
+{
+    bool sound = step->what % 2 == 0;
+    switch (step->what % 8) {
+    case 0:
+    case 1:
+        feed_tcp(step->data, step->length ? step->length : 1u, sound);
+        break;
+    case 2:
+    case 3:
+        feed_rtu(step->data, step->length, sound);
+        break;
+    default:
+        give_command(step->data);
+        break;
+    }
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     begin();
     for (; size >= fuzz_step_bytes; data += fuzz_step_bytes, size -= fuzz_step_bytes) {
         const struct fuzz_step step = fuzz_step(data);
-        switch (step.what % 16) {
-        case 0:
-            ask(step.data, step.length);
-            break;
-        case 1:
-        case 2:
-            ask_read(step.data);
-            break;
-        case 3:
-        case 4:
-            ask_write(step.data);
-            break;
-        case 5:
-        case 6:
-            ask_both(step.data);
-            break;
-        case 7:
-        case 8:
-        case 9:
-        case 10:
-            give_command(step.data);
-            break;
-        case 11:
-            feed_tcp(step.data, step.length ? step.length : 1u, true);
-            break;
-        case 12:
-            feed_tcp(step.data, step.length ? step.length : 1u, false);
-            break;
-        case 13:
-            feed_rtu(step.data, step.length, true);
-            break;
-        case 14:
-            feed_rtu(step.data, step.length, false);
-            break;
-        default:
-            run_drive(step.data[0]);
-            break;
-        }
+        if (step.what & 0x80u)
+            request(&step);
+        else
+            carry(&step);
         check();
     }
     return 0;

@@ -31,13 +31,13 @@ enum slave_fault {
     slave_flip,      ///< bit `number` of the reply
     slave_wrong_id,  ///< unit or address of another slave; check sums are right from here on
     slave_wrong_function,
-    slave_wrong_count, ///< says and sends `number` registers more
+    slave_wrong_count,       ///< says and sends `number` registers more
     slave_wrong_transaction, ///< TCP only
     slave_late,              ///< by `number` ms
     slave_doubled,
-    slave_merged,    ///< in one piece behind the reply before
-    slave_split,     ///< after `number` bytes, with a short gap
-    slave_echo,      ///< the request itself comes back first
+    slave_merged, ///< in one piece behind the reply before
+    slave_split,  ///< after `number` bytes, with a short gap
+    slave_echo,   ///< the request itself comes back first
     slave_silent,
     slave_gone, ///< closes the connection, or the line, for good
 };

@@ -2,6 +2,7 @@
 /// Fits to runs of the simulated drive whose truth and noise are known.
 #include "lab/diagnose/fit.h"
 
+#include "lab/diagnose/repeat.h"
 #include "lab/numeric/statistics.h"
 #include "sim/belt_drive.h"
 #include "unity.h"
@@ -244,6 +245,26 @@ static void test_fit_deviations_are_the_scatter_over_fresh_noise(void)
     assert_deviations("coulomb_friction", 0.02, truth.coulomb_friction_Nm);
 }
 
+static void test_repeat_adds_by_how_much_other_data_give_another_number(void)
+{
+    record(9);
+    given.viscous_friction_Nms_per_rad = 0.002;
+    hypothesis_init(&hypothesis, &given, false, true);
+    int effect = name("viscous_friction", 0.002);
+    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 10));
+    struct repeat repeat;
+    TEST_ASSERT_TRUE(repeat_compare(&data, &hypothesis, &fit, &data, &repeat));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, repeat.variance[effect][0]); // the same data
+    // A value that is fifty deviations from what the other data say, both deviations alike.
+    double value, deviation;
+    hypothesis_parameters(&hypothesis, effect, fit.covariance, &value, &deviation);
+    for (size_t i = 0; i < hypothesis.count; i++)
+        if (hypothesis.coordinates[i].effect == effect) // on a linear scale
+            hypothesis.x[i] = (value + 50.0 * deviation) / hypothesis.coordinates[i].unit;
+    TEST_ASSERT_TRUE(repeat_compare(&data, &hypothesis, &fit, &data, &repeat));
+    TEST_ASSERT_DOUBLE_WITHIN(0.05 * 50.0 * deviation, 50.0 * deviation, sqrt(repeat.variance[effect][0]));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -253,5 +274,6 @@ int main(void)
     RUN_TEST(test_fit_never_makes_it_worse);
     RUN_TEST(test_fit_step_with_borrowed_derivatives_is_the_first_step_of_a_fit);
     RUN_TEST(test_fit_deviations_are_the_scatter_over_fresh_noise);
+    RUN_TEST(test_repeat_adds_by_how_much_other_data_give_another_number);
     return UNITY_END();
 }

@@ -114,15 +114,15 @@ static void test_modbus_map_refuses_values_out_of_range(void)
         uint16_t words[2];
         uint32_t count;
     } bad[] = {
-        {0x44, {2, 0}, 1},           // MODE
-        {0x45, {4, 0}, 1},           // INPUT
-        {0x4A, {0, 0}, 2},           // MEASURE_PERIODS 0
-        {0x4A, {0xFFFF, 0}, 2},      // too many
-        {0x4E, {0, 0}, 2},           // ABORT_SAMPLES 0
-        {0x50, {0x7FC0, 0}, 2},      // NaN
-        {0x50, {0x7F80, 0}, 2},      // infinity
-        {0x50, {0xBF80, 0}, 2},      // -1 as a torque limit
-        {0x54, {0xFF80, 0}, 2},      // -infinity
+        {0x44, {2, 0}, 1},      // MODE
+        {0x45, {4, 0}, 1},      // INPUT
+        {0x4A, {0, 0}, 2},      // MEASURE_PERIODS 0
+        {0x4A, {0xFFFF, 0}, 2}, // too many
+        {0x4E, {0, 0}, 2},      // ABORT_SAMPLES 0
+        {0x50, {0x7FC0, 0}, 2}, // NaN
+        {0x50, {0x7F80, 0}, 2}, // infinity
+        {0x50, {0xBF80, 0}, 2}, // -1 as a torque limit
+        {0x54, {0xFF80, 0}, 2}, // -infinity
     };
     for (unsigned i = 0; i < sizeof bad / sizeof bad[0]; i++)
         TEST_ASSERT_EQUAL_INT(modbus_exception_value, write_words(bad[i].address, bad[i].count, bad[i].words));
@@ -145,10 +145,21 @@ static void test_modbus_map_takes_a_command_only_whole(void)
 
 // ---- Every command in every state
 
-enum place { at_idle, at_uploading, at_verified, at_armed, at_settling, at_running, at_stopping, at_done, at_fault, places };
-static const enum modbus_state state_at[places] = {
-    modbus_state_idle,     modbus_state_uploading, modbus_state_verified, modbus_state_armed, modbus_state_settling,
-    modbus_state_running,  modbus_state_stopping,  modbus_state_done,     modbus_state_fault};
+enum place {
+    at_idle,
+    at_uploading,
+    at_verified,
+    at_armed,
+    at_settling,
+    at_running,
+    at_stopping,
+    at_done,
+    at_fault,
+    places
+};
+static const enum modbus_state state_at[places] = {modbus_state_idle,     modbus_state_uploading, modbus_state_verified,
+                                                   modbus_state_armed,    modbus_state_settling,  modbus_state_running,
+                                                   modbus_state_stopping, modbus_state_done,      modbus_state_fault};
 
 static void go_to(enum place place)
 {

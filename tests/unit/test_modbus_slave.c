@@ -186,8 +186,8 @@ static void test_modbus_pdu_refuses_counts_and_lengths(void)
         {{3, 0, 0, 0, 1, 0}, 6, modbus_exception_value},
         {{3, 0, 0x13, 0, 1}, 5, modbus_exception_address},
         {{4, 0xFF, 0xFF, 0, 2}, 5, modbus_exception_address},
-        {{6, 0, 0, 0, 1}, 5, modbus_exception_address},       // read only
-        {{6, 0, 0x48, 0, 1}, 5, modbus_exception_value},      // half a number
+        {{6, 0, 0, 0, 1}, 5, modbus_exception_address},  // read only
+        {{6, 0, 0x48, 0, 1}, 5, modbus_exception_value}, // half a number
         {{6, 0, 0x1F, 0}, 4, modbus_exception_value},
         {{16, 0, 0x1F, 0, 0, 0}, 6, modbus_exception_value},
         {{16, 0, 0x1F, 0, 1, 1, 5}, 7, modbus_exception_value},

@@ -13,7 +13,7 @@
 enum { room_bytes = 3000 };
 
 struct owner {
-    struct od_data table, text, in_place;
+    struct od_data table, text, in_place, fixed;
     uint16_t number;
     uint32_t odd_refused;
 };
@@ -40,6 +40,7 @@ static const struct od_entry entries[] = {
     {0x2101, 0, od_u16, od_readable | od_writable, AT(number), 0, NULL},
     {0x2102, 0, od_domain, od_readable | od_writable, AT(in_place), 0, NULL},
     {0x2103, 0, od_domain, od_writable, AT(in_place), 0, NULL},
+    {0x2104, 0, od_domain, od_readable | od_writable, AT(fixed), 0, NULL}, // a slip of the table's author: no room
 };
 
 static const struct object_dictionary dictionary = {
@@ -60,6 +61,7 @@ void setUp(void)
         .table = {.bytes = old_bytes, .size = 10, .room = room, .capacity = room_bytes},
         .text = {.bytes = (const uint8_t *)name, .size = sizeof name - 1},
         .in_place = {.bytes = in_place_bytes, .size = 5, .room = in_place_bytes, .capacity = sizeof in_place_bytes},
+        .fixed = {.bytes = old_bytes, .size = 3},
         .number = 0x1234,
     };
     server = (struct sdo_server){.node_id = 5, .dictionary = &dictionary};
@@ -334,6 +336,132 @@ static void test_sdo_server_switches_to_segments_below_the_clients_threshold(voi
     TEST_ASSERT_EQUAL_HEX32(od_abort_block_size, can_get(&answer.data[4], 4));
 }
 
+/// Hands the server eight bytes; the answer's command byte, or 0 if it says nothing.
+static uint8_t say(uint8_t command, uint32_t first, uint32_t second, struct can_frame *out_answer)
+{
+    struct can_frame request = can_frame_make(0x605, 8);
+    request.data[0] = command;
+    can_put(&request.data[1], 3, first);
+    can_put(&request.data[4], 4, second);
+    *out_answer = can_frame_make(0, 0);
+    return sdo_server_take(&server, &request, 0, out_answer) ? out_answer->data[0] : 0;
+}
+
+static void says_abort(uint8_t command, uint32_t first, uint32_t second, uint32_t abort_code)
+{
+    struct can_frame answer;
+    TEST_ASSERT_EQUAL_HEX8(0x80, say(command, first, second, &answer));
+    TEST_ASSERT_EQUAL_HEX32(abort_code, can_get(&answer.data[4], 4));
+    TEST_ASSERT_EQUAL(sdo_server_idle, server.state);
+}
+
+static void test_sdo_server_refuses_a_toggle_bit_that_stays(void)
+{
+    struct can_frame answer;
+    TEST_ASSERT_EQUAL_HEX8(0x60, say(0x20, 0x2100, 0, &answer));
+    TEST_ASSERT_EQUAL_HEX8(0x20, say(0x00, 0, 0, &answer));
+    says_abort(0x00, 0, 0, od_abort_toggle);
+    TEST_ASSERT_EQUAL_HEX8(0x41, say(0x40, 0x1008, 0, &answer));
+    TEST_ASSERT_EQUAL_HEX8(0x00, say(0x60, 0, 0, &answer));
+    says_abort(0x60, 0, 0, od_abort_toggle);
+}
+
+static void test_sdo_client_refuses_a_toggle_bit_that_stays(void)
+{
+    struct can_frame answer = can_frame_make(0x585, 8), frame;
+    sdo_client_download_data(&client, sdo_segmented, 0x2100, 0, source, 100);
+    answer.data[0] = 0x60;
+    can_put(&answer.data[1], 2, 0x2100);
+    sdo_client_take(&client, &answer);
+    answer = can_frame_make(0x585, 8);
+    answer.data[0] = 0x20;
+    sdo_client_take(&client, &answer);
+    TEST_ASSERT_EQUAL(sdo_client_waiting, client.state);
+    sdo_client_take(&client, &answer);
+    TEST_ASSERT_EQUAL(sdo_client_aborted, client.state);
+    TEST_ASSERT_EQUAL_HEX32(od_abort_toggle, client.abort_code);
+    TEST_ASSERT_TRUE(sdo_client_upcoming(&client, &frame)); // and tells the server
+    TEST_ASSERT_EQUAL_HEX8(0x80, frame.data[0]);
+}
+
+static void test_sdo_server_keeps_a_download_without_size_within_its_room(void)
+{
+    struct can_frame answer;
+    TEST_ASSERT_EQUAL_HEX8(0x60, say(0x20, 0x2102, 0, &answer));
+    TEST_ASSERT_EQUAL_HEX8(0x20, say(0x00, 0, 0, &answer));
+    TEST_ASSERT_EQUAL_HEX8(0x30, say(0x10, 0, 0, &answer));
+    says_abort(0x00, 0, 0, od_abort_too_long); // 21 bytes into 16
+    TEST_ASSERT_EQUAL_UINT32(0, owner.in_place.size);
+}
+
+static void test_sdo_server_holds_the_client_to_the_size_it_said(void)
+{
+    struct can_frame answer;
+    TEST_ASSERT_EQUAL_HEX8(0x60, say(0x21, 0x2100, 8, &answer));
+    says_abort(0x01, 0, 0, od_abort_too_short); // the last seven of eight
+    TEST_ASSERT_EQUAL_HEX8(0x60, say(0x21, 0x2100, 6, &answer));
+    says_abort(0x01, 0, 0, od_abort_too_long);
+    TEST_ASSERT_TRUE(owner.table.bytes == old_bytes);
+    TEST_ASSERT_EQUAL_UINT32(10, owner.table.size);
+    says_abort(0x21, 0x2104, 8, od_abort_read_only);
+    says_abort(0x23, 0x2104, 8, od_abort_read_only);
+    says_abort(0xC2, 0x2104, 8, od_abort_read_only);
+}
+
+static void test_sdo_server_does_not_answer_the_end_of_a_sub_block_twice(void)
+{
+    struct can_frame answer;
+    TEST_ASSERT_EQUAL_HEX8(0xA4, say(0xC6, 0x2100, 1000, &answer));
+    for (uint8_t number = 1; number < sdo_block_max; number++)
+        TEST_ASSERT_EQUAL_HEX8(0, say(number, 0, 0, &answer));
+    TEST_ASSERT_EQUAL_HEX8(0xA2, say(sdo_block_max, 0, 0, &answer));
+    TEST_ASSERT_EQUAL(sdo_block_max, answer.data[1]);
+    TEST_ASSERT_EQUAL_HEX8(0, say(sdo_block_max, 0, 0, &answer)); // an answer would be taken for the next one's
+    TEST_ASSERT_EQUAL_HEX8(0, say(1, 0, 0, &answer));
+    TEST_ASSERT_EQUAL_HEX8(0xA2, say(sdo_block_max, 0, 0, &answer));
+    TEST_ASSERT_EQUAL(1, answer.data[1]);
+}
+
+static void test_sdo_block_sender_gives_up_on_a_receiver_that_never_gets_anything(void)
+{
+    struct can_frame answer;
+    TEST_ASSERT_EQUAL_HEX8(0xC6, say(0xA4, 0x1008, 4, &answer));
+    TEST_ASSERT_EQUAL_HEX8(0, say(0xA3, 0, 0, &answer));
+    for (int n = 0; n <= sdo_stalled_max; n++) {
+        for (; sdo_server_upcoming(&server, &answer); sdo_server_sent(&server, 0))
+            ;
+        struct can_frame nothing = can_frame_make(0x605, 8);
+        nothing.data[0] = 0xA2; // the last segment in order was number 0
+        nothing.data[2] = 4;
+        bool answered = sdo_server_take(&server, &nothing, 0, &answer);
+        TEST_ASSERT_EQUAL(n == sdo_stalled_max, answered);
+    }
+    TEST_ASSERT_EQUAL_HEX32(od_abort_timeout, can_get(&answer.data[4], 4));
+}
+
+static void test_sdo_block_client_passes_over_an_answer_to_what_it_has_not_sent(void)
+{
+    struct can_frame answer = can_frame_make(0x585, 8), frame;
+    sdo_client_download_data(&client, sdo_block, 0x2100, 0, source, 100);
+    answer.data[0] = 0xA4;
+    can_put(&answer.data[1], 2, 0x2100);
+    answer.data[4] = 10;
+    sdo_client_take(&client, &answer);
+    for (int n = 0; n < 3; n++) {
+        TEST_ASSERT_TRUE(sdo_client_upcoming(&client, &frame));
+        TEST_ASSERT_EQUAL(n + 1, frame.data[0]);
+        sdo_client_sent(&client);
+    }
+    answer = can_frame_make(0x585, 8);
+    answer.data[0] = 0xA2;
+    answer.data[1] = 2;
+    answer.data[2] = 10;
+    sdo_client_take(&client, &answer);
+    TEST_ASSERT_EQUAL_UINT32(1, client.unexpected);
+    TEST_ASSERT_TRUE(sdo_client_upcoming(&client, &frame));
+    TEST_ASSERT_EQUAL(4, frame.data[0]);
+}
+
 static void test_sdo_domain_in_place_is_empty_while_it_changes(void)
 {
     struct can_frame request = sdo_client_download_data(&client, sdo_segmented, 0x2102, 0, source, 16), answer;
@@ -472,6 +600,13 @@ int main(void)
     RUN_TEST(test_sdo_server_gives_up_after_its_time_and_says_so);
     RUN_TEST(test_sdo_server_forgets_a_transfer_with_an_abort_or_a_new_one);
     RUN_TEST(test_sdo_server_switches_to_segments_below_the_clients_threshold);
+    RUN_TEST(test_sdo_server_refuses_a_toggle_bit_that_stays);
+    RUN_TEST(test_sdo_client_refuses_a_toggle_bit_that_stays);
+    RUN_TEST(test_sdo_server_keeps_a_download_without_size_within_its_room);
+    RUN_TEST(test_sdo_server_holds_the_client_to_the_size_it_said);
+    RUN_TEST(test_sdo_server_does_not_answer_the_end_of_a_sub_block_twice);
+    RUN_TEST(test_sdo_block_sender_gives_up_on_a_receiver_that_never_gets_anything);
+    RUN_TEST(test_sdo_block_client_passes_over_an_answer_to_what_it_has_not_sent);
     RUN_TEST(test_sdo_domain_in_place_is_empty_while_it_changes);
     RUN_TEST(test_sdo_server_stands_every_byte_and_length_in_every_state);
     RUN_TEST(test_sdo_client_stands_every_byte_and_length_in_every_phase);

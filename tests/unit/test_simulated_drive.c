@@ -7,6 +7,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { node_id = 5, period_us = 1000, sent_max = 64 };
@@ -102,12 +103,17 @@ static void cycles(unsigned count)
     }
 }
 
-static void enable(enum cia402_mode mode)
+static void ask_for_operation(enum cia402_mode mode)
 {
     put(cia402_modes_of_operation, 0, mode);
     command(cia402_control_shutdown);
     command(cia402_control_switch_on);
     command(cia402_control_enable_operation);
+}
+
+static void enable(enum cia402_mode mode)
+{
+    ask_for_operation(mode);
     TEST_ASSERT_EQUAL(cia402_operation_enabled, drive.machine.state);
 }
 
@@ -172,7 +178,6 @@ static void test_simulated_drive_csv_follows_60ff_plus_60b1_within_607f(void)
     put(cia402_velocity_offset, 0, 1000000);
     cycles(300);
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 6.0, drive.sample.velocity);
-    TEST_ASSERT_FALSE(status() & cia402_status_limited);
     put(cia402_max_velocity, 0, 6000000);
     cycles(1);
     TEST_ASSERT_FALSE(status() & cia402_status_limited); // equal is inside
@@ -468,12 +473,7 @@ static bool faults_with_window(uint32_t window, int32_t error, uint16_t timeout_
     put(cia402_target_position, 0, error);
     cycles(samples);
     TEST_ASSERT_EQUAL_INT32(0, drive.objects.position_actual);
-    bool faulted = drive.objects.error_code == emcy_following_error;
-    TEST_ASSERT_EQUAL(faulted,
-                      drive.machine.state == cia402_fault_reaction_active || drive.machine.state == cia402_fault);
-    if (!faulted)
-        TEST_ASSERT_EQUAL_INT32(error, drive.objects.following_error_actual);
-    return faulted;
+    return drive.objects.error_code == emcy_following_error;
 }
 
 static void test_simulated_drive_following_error_holds_to_one_count_and_one_sample(void)
@@ -616,19 +616,14 @@ static void test_simulated_drive_checks_60c2_against_the_real_period(void)
 
 static void test_simulated_drive_clock_that_drifts_is_noticed_when_it_matters(void)
 {
-    TEST_ASSERT_EQUAL(cia402_operation_enabled, after_syncs_of(1000, 0.25, 500.0));
-    TEST_ASSERT_EQUAL(cia402_operation_enabled, after_syncs_of(1000, 0.25, -200000.0));
-    TEST_ASSERT_EQUAL(cia402_fault, after_syncs_of(1000, 0.25, 300000.0));
-    TEST_ASSERT_EQUAL(cia402_fault, after_syncs_of(1000, 0.25, -300000.0));
+    for (int ppm = -300000; ppm <= 300000; ppm += 100000)
+        TEST_ASSERT_EQUAL(abs(ppm) < 250000, after_syncs_of(1000, 0.25, ppm) == cia402_operation_enabled);
 }
 
 static void test_simulated_drive_refuses_operation_with_another_1006_than_60c2(void)
 {
     put(0x1006, 0, 2 * period_us);
-    put(cia402_modes_of_operation, 0, cia402_mode_csp);
-    command(cia402_control_shutdown);
-    command(cia402_control_switch_on);
-    command(cia402_control_enable_operation);
+    ask_for_operation(cia402_mode_csp);
     TEST_ASSERT_EQUAL(cia402_fault, drive.machine.state);
     TEST_ASSERT_EQUAL_UINT16(emcy_parameter, last_emergency());
 }
@@ -645,20 +640,21 @@ static void test_simulated_drive_sync_time_out_is_configurable(void)
     TEST_ASSERT_EQUAL_UINT16(emcy_sync_lost, last_emergency());
 }
 
-static void map_status(void)
+/// Maps one object to a PDO; `parameters` is 1400, 1401, .. or 1800, ...
+static void map_one(uint16_t parameters, uint32_t cob_id, uint8_t type, uint32_t entry)
 {
-    struct od_place place;
-    TEST_ASSERT_EQUAL_HEX32(od_abort_none, od_locate(&drive.node.dictionary, 0x1A00, 1, &place));
-    put(0x1800, 1, 0x80000000u | (0x180 + node_id));
-    put(0x1A00, 0, 0);
-    put(0x1A00, 1, 0x60410010);
-    put(0x1A00, 0, 1);
-    put(0x1800, 1, 0x180 + node_id);
+    uint16_t mapping = (uint16_t)(parameters + 0x200);
+    put(parameters, 1, 0x80000000u | cob_id);
+    put(parameters, 2, type);
+    put(mapping, 0, 0);
+    put(mapping, 1, entry);
+    put(mapping, 0, 1);
+    put(parameters, 1, cob_id);
 }
 
 static void test_simulated_drive_delays_from_sync_to_sample_and_reply(void)
 {
-    map_status();
+    map_one(0x1800, 0x180 + node_id, 1, 0x60410010);
     simulated_drive_set_delays(&drive, 70, 180);
     uint32_t samples = drive.samples;
     let_pass(now_us + period_us);
@@ -689,6 +685,27 @@ static void test_simulated_drive_runs_on_its_own_when_nobody_sends_sync(void)
     TEST_ASSERT_EQUAL_HEX16(0x40, status() & 0x4F);
 }
 
+/// Without the check of 2002 each synchronous RPDO stands for itself, but a sample says if one was missing.
+static void test_simulated_drive_takes_an_incomplete_set_without_a_check_and_says_so(void)
+{
+    map_one(0x1400, 0x200 + node_id, 1, 0x60400010);
+    map_one(0x1401, 0x300 + node_id, 1, 0x60710010);
+    enable(cia402_mode_cst);
+    struct can_frame word = can_frame_make(0x200 + node_id, 2), torque = can_frame_make(0x300 + node_id, 2);
+    can_put(word.data, 2, cia402_control_enable_operation);
+    can_put(torque.data, 2, 77);
+    give(&word);
+    give(&torque);
+    cycles(1);
+    TEST_ASSERT_EQUAL_INT16(77, drive.objects.torque_demand);
+    TEST_ASSERT_TRUE(status() & cia402_status_follows);
+    can_put(torque.data, 2, 78);
+    give(&torque);
+    cycles(1);
+    TEST_ASSERT_EQUAL_INT16(78, drive.objects.torque_demand);
+    TEST_ASSERT_FALSE(status() & cia402_status_follows);
+}
+
 // ---- One commander
 
 static struct can_frame download(uint16_t index, uint8_t subindex, uint8_t size, uint32_t value)
@@ -711,18 +728,13 @@ static uint32_t abort_after(struct can_frame frame)
     return 0;
 }
 
-static void stream_control_words(void)
-{
-    put(0x1400, 1, 0x80000000u | (0x200 + node_id));
-    put(0x1600, 0, 0);
-    put(0x1600, 1, 0x60400010);
-    put(0x1600, 0, 1);
-    put(0x1400, 1, 0x200 + node_id);
-}
-
 static void test_simulated_drive_second_commander_is_refused_but_may_stop(void)
 {
-    stream_control_words();
+    enable(cia402_mode_cst); // as long as nobody streams, SDO commands
+    TEST_ASSERT_EQUAL_HEX32(0, abort_after(download(0x6071, 0, 2, 100)));
+    TEST_ASSERT_EQUAL_INT16(100, drive.objects.target_torque);
+    start();
+    map_one(0x1400, 0x200 + node_id, 255, 0x60400010);
     enable(cia402_mode_cst);
     static const struct {
         uint16_t index;
@@ -750,13 +762,6 @@ static void test_simulated_drive_second_commander_is_refused_but_may_stop(void)
     TEST_ASSERT_EQUAL(cia402_switch_on_disabled, drive.machine.state);
     TEST_ASSERT_EQUAL_HEX32(0, abort_after(download(0x6072, 0, 2, 500))); // without torque anybody may set it up
     TEST_ASSERT_EQUAL_UINT16(500, drive.objects.max_torque);
-}
-
-static void test_simulated_drive_without_streaming_is_commanded_by_sdo(void)
-{
-    enable(cia402_mode_cst);
-    TEST_ASSERT_EQUAL_HEX32(0, abort_after(download(0x6071, 0, 2, 100)));
-    TEST_ASSERT_EQUAL_INT16(100, drive.objects.target_torque);
 }
 
 int main(void)
@@ -789,7 +794,7 @@ int main(void)
     RUN_TEST(test_simulated_drive_sync_time_out_is_configurable);
     RUN_TEST(test_simulated_drive_delays_from_sync_to_sample_and_reply);
     RUN_TEST(test_simulated_drive_runs_on_its_own_when_nobody_sends_sync);
+    RUN_TEST(test_simulated_drive_takes_an_incomplete_set_without_a_check_and_says_so);
     RUN_TEST(test_simulated_drive_second_commander_is_refused_but_may_stop);
-    RUN_TEST(test_simulated_drive_without_streaming_is_commanded_by_sdo);
     return UNITY_END();
 }

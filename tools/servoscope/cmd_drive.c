@@ -25,6 +25,7 @@ struct scheme {
 
 static const struct scheme schemes[] = {
     {"can", driving_can},
+    {"odrive", driving_odrive},
     {"modbus", driving_modbus},
 };
 
@@ -119,13 +120,14 @@ const struct command command_cmd_drive = {
         "  --modbus tcp:HOST:PORT      a Modbus drive that plays the table and measures by itself (docs/modbus.md);\n"
         "                       HOST left out: this machine alone; port 0: a free one, said on standard output\n"
         "  --modbus rtu:DEVICE:BAUD    the same on a serial line, as slave number N\n"
+        "  --odrive BUS         an ODrive on its own clock (CAN Simple); buses as for --can\n"
         "  --node N             its number, 1..127 (default 5)\n"
         "  --for SECONDS        ends by itself (default: Ctrl-C ends it)\n"
-        "  --latch-delay US     from SYNC to the sample (default 0); --reply-delay US: from there to the answer\n"
+        "  --latch-delay US     from SYNC to the sample (default 0)\n"
+        "  --reply-delay US     from the sample to the answer (default 0)\n"
         "  --clock-drift PPM    by how much the drive's own clock is fast (time-outs, heartbeats)\n"
-        "  --period-tolerance R looks whether SYNC comes at the period in 60C2, within this share: 0.25 (default: "
-        "does\n"
-        "                       not look, a machine without real-time rights keeps no period)\n"
+        "  --period-tolerance R  looks whether SYNC comes at the period in 60C2, within this share: 0.25\n"
+        "                       (default: does not look, a machine without real-time rights keeps no period)\n"
         "  --faults LIST        makes things go wrong, separated by commas (docs/bus.md): frames, counted for each\n"
         "                       COB-ID: drop:285:100[:COUNT] duplicate:285:100 swap:185:100 shorten:185:100\n"
         "                       delay:285:100:US corrupt:185:100:BYTE:MASK bus-off:80:100:US; the drive, by SYNC:\n"

@@ -91,7 +91,7 @@ const struct command command_cmd_measure = {
             "\n"
             "usage: servoscope measure --drive URL --table T.mst --periods P [options] --out RUN.csv\n"
             "\n"
-            "  --drive URL          " DOOR_HELP "\n" MEASURING_HELP "\n"
+            "  --drive URL          " DOOR_HELP "\n" MODBUS_MEASURING_HELP "\n" MEASURING_HELP "\n"
             "Ctrl-C, a limit, a lost bus or a fault of the drive stop it: the excitation is ramped to zero where the "
             "drive\n"
             "still listens, the drive is brought to rest, and what was measured is kept and marked (keys interrupted,\n"

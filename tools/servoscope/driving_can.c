@@ -30,12 +30,12 @@ static uint64_t earlier(uint64_t a, uint64_t b)
     return a < b ? a : b;
 }
 
-/// Until the time, a signal, or the bus's end.
-static enum can_status serve(const struct can_port *port, const struct can_participant *drive, uint64_t end_us)
+enum can_status driving_serve(const struct can_port *port, const struct can_participant *drive, double for_s)
 {
     const struct can_port_operations *bus = port->operations;
     enum can_status status = can_ok;
     uint64_t now_us = bus->time_us(port->self);
+    const uint64_t end_us = for_s > 0.0 ? now_us + (uint64_t)(for_s * 1e6) : CAN_NEVER_US;
     while (status != can_err_gone && now_us < end_us && !*interrupt_flag()) {
         uint64_t due_us = earlier(drive->deadline_us(drive->self), earlier(end_us, now_us + longest_wait_us));
         if (due_us > now_us) {
@@ -53,14 +53,14 @@ static enum can_status serve(const struct can_port *port, const struct can_parti
     return status;
 }
 
-static void say_start(const struct driving *self, const struct driving_request *request, const char *name,
-                      const struct command_context *context)
+void driving_say_start(const struct can_bus *bus, const struct driving_request *request, const char *name,
+                       const struct command_context *context)
 {
     char where[300];
     if (context->json || context->quiet) {
         return;
     }
-    can_bus_describe(&self->bus, name, where, sizeof where);
+    can_bus_describe(bus, name, where, sizeof where);
     printf("node %lld on %s; Ctrl-C ends it\n", request->node, where);
     fflush(stdout);
 }
@@ -145,12 +145,10 @@ static int run_drive(struct driving *self, const struct driving_request *request
     simulated_drive_set_faults(&self->drive, self->faults.drive, self->faults.drive_count);
     simulated_drive_set_drift(&self->drive, request->drift_ppm);
     const struct can_participant participant = simulated_drive_participant(&self->drive);
-    uint64_t now_us = port.operations->time_us(port.self);
-    uint64_t end_us = request->for_s > 0.0 ? now_us + (uint64_t)(request->for_s * 1e6) : CAN_NEVER_US;
     interrupt_catch(&signals, false);
     real_time_enter(&self->rights);
-    say_start(self, request, name, context);
-    enum can_status ended = serve(&port, &participant, end_us);
+    driving_say_start(&self->bus, request, name, context);
+    enum can_status ended = driving_serve(&port, &participant, request->for_s);
     real_time_leave(&self->rights);
     interrupt_release(&signals);
     int status = say_end(self, context, out_error);

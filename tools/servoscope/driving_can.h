@@ -5,6 +5,7 @@
 
 #include "lab/record/error.h"
 #include "sim/model.h"
+#include "tools/servoscope/can_bus.h"
 #include "tools/servoscope/command.h"
 
 /// What the options of `drive` say, whatever the bus.
@@ -22,5 +23,16 @@ struct driving_request {
 /// Errors: error_usage (no such kind of bus, no such fault), error_refused (bus cannot be opened, or was lost)
 int driving_can(const struct driving_request *request, const char *name, struct sim_model *model,
                 const struct command_context *context, struct error *out_error);
+
+/// The same model as an ODrive on its own clock (CAN Simple). Takes node 1..62 and no faults.
+int driving_odrive(const struct driving_request *request, const char *name, struct sim_model *model,
+                   const struct command_context *context, struct error *out_error);
+
+/// Gives a drive the bus's frames and the wall clock's time, for a time (0: for ever), until a signal or the bus's end.
+enum can_status driving_serve(const struct can_port *port, const struct can_participant *drive, double for_s);
+
+/// Says where the drive is, unless nothing is to be said.
+void driving_say_start(const struct can_bus *bus, const struct driving_request *request, const char *name,
+                       const struct command_context *context);
 
 #endif

@@ -89,12 +89,13 @@ static void print_histogram(const char *what, const struct bus_histogram *histog
 {
     printf("  %s: mean %.0f us, 99 %% within %lu us, worst %lu us\n   ", what, bus_histogram_mean_us(histogram),
            (unsigned long)bus_histogram_quantile_us(histogram, 0.99), (unsigned long)histogram->greatest_us);
-    for (int i = 0; i < bus_histogram_bins; i++) {
-        if (histogram->bins[i] > 0 && i < bus_histogram_bins - 1) {
+    for (int i = 0; i < bus_histogram_bins - 1; i++) {
+        if (histogram->bins[i] > 0) {
             printf(" <=%lu: %lu", (unsigned long)bus_histogram_ends_us[i], (unsigned long)histogram->bins[i]);
-        } else if (histogram->bins[i] > 0) {
-            printf(" more: %lu", (unsigned long)histogram->bins[i]);
         }
+    }
+    if (histogram->bins[bus_histogram_bins - 1] > 0) {
+        printf(" more: %lu", (unsigned long)histogram->bins[bus_histogram_bins - 1]);
     }
     puts("");
 }
@@ -168,7 +169,7 @@ static bool set_histogram(struct run *run, const char *name, const struct bus_hi
     return set && run_set_key(run, key, counts);
 }
 
-static bool set_real_time(struct run *run, const struct door_statistics *bus)
+static bool set_histograms(struct run *run, const struct door_statistics *bus)
 {
     char ends[160] = "[";
     for (int i = 0; i < bus_histogram_bins - 1; i++) {
@@ -176,14 +177,19 @@ static bool set_real_time(struct run *run, const struct door_statistics *bus)
         snprintf(&ends[used], sizeof ends - used, "%lu%s", (unsigned long)bus_histogram_ends_us[i],
                  i + 2 < bus_histogram_bins ? ", " : "]");
     }
+    return run_set_key(run, "histogram_ends_us", ends) && set_histogram(run, "sync_jitter", &bus->spacing) &&
+           set_histogram(run, "sync_to_answer", &bus->reply);
+}
+
+static bool set_real_time(struct run *run, const struct door_statistics *bus)
+{
     return set_text(run, "bus_bitrate", "%lu", (unsigned long)bus->bitrate) &&
            run_set_key(run, "real_time", bus->rights) &&
            set_text(run, "syncs_late", "%lu", (unsigned long)bus->syncs_late) &&
            set_text(run, "frames_unsent", "%lu", (unsigned long)bus->frames_unsent) &&
            set_text(run, "frames_lost", "%lu", (unsigned long)bus->frames_lost) &&
            set_text(run, "error_frames", "%lu", (unsigned long)bus->error_frames) &&
-           run_set_key(run, "histogram_ends_us", ends) && set_histogram(run, "sync_jitter", &bus->spacing) &&
-           set_histogram(run, "sync_to_answer", &bus->reply);
+           (bus->spacing.count == 0 || set_histograms(run, bus));
 }
 
 int measured_keep(const struct measured *self, struct error *out_error)

@@ -4,8 +4,8 @@
 #include "core/bytes.h"
 #include "drivers/modbus/host.h"
 #include "ports/modbus_host.h"
-#include "tools/servoscope/modbus_response.h"
 #include "tools/servoscope/interrupt.h"
+#include "tools/servoscope/modbus_response.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -157,11 +157,9 @@ static struct modbus_host_setup make_setup(const struct job *self)
                 .abort_samples = ramp,
                 .dwell_samples = (uint32_t)ceil(measure_dwell_s * rate_hz(table)),
                 .host_timeout_ms = host_timeout_ms,
-                .torque_limit =
-                    (float)(limited ? limits->torque_max_Nm : default_torque_margin * peak_torque(table)),
-                .velocity_limit = limits->velocity_max_rad_per_s < CORE_REAL_MAX
-                                      ? (float)limits->velocity_max_rad_per_s
-                                      : 0.0f,
+                .torque_limit = (float)(limited ? limits->torque_max_Nm : default_torque_margin * peak_torque(table)),
+                .velocity_limit =
+                    limits->velocity_max_rad_per_s < CORE_REAL_MAX ? (float)limits->velocity_max_rad_per_s : 0.0f,
                 .position_min = travel ? (float)limits->position_min_rad : 0.0f,
                 .position_max = travel ? (float)limits->position_max_rad : 0.0f},
     };
@@ -219,6 +217,11 @@ static bool is_over(enum modbus_state state)
 static enum modbus_host_status read_periods(struct job *self)
 {
     uint32_t bins = self->measuring->plan.table->bin_count;
+    uint32_t kept = self->host.identity.periods_kept, done = self->state.periods_done;
+    if (done - self->next_period > kept) {
+        self->response.unread += done - kept - self->next_period;
+        self->next_period = done - kept;
+    }
     while (self->next_period < self->state.periods_done) {
         struct modbus_host_spectrum seen;
         enum modbus_host_status got =
@@ -270,7 +273,6 @@ static int follow(struct job *self, struct error *out_error)
         }
     } while (!is_over(self->state.state) && now_s() - started_s < longest_s);
     if (!is_over(self->state.state)) {
-        modbus_host_command(&self->host, modbus_command_stop);
         return error_set(out_error, error_refused, "--drive: after %.0f s the drive is still %s", longest_s,
                          modbus_state_str(self->state.state));
     }
@@ -318,6 +320,10 @@ static int measure(struct job *self, const char *url, const struct command_conte
     }
     status = set_up(self, out_error);
     status = status ? status : follow(self, out_error);
+    if (status && !is_over(self->state.state)) {
+        modbus_host_command(&self->host,
+                            modbus_command_stop); // else the drive finds out by itself, host_timeout_ms later
+    }
     status = status ? status : read_means(self, out_error);
     terminal_line_clear(&self->line);
     if (status) {

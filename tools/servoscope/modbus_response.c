@@ -113,8 +113,7 @@ static bool set_keys(const struct modbus_response *self, const struct modbus_res
 {
     bool set = setup_set_keys(io_frf, setup_zoh, 0.0) && estimate_set_key(io_frf, "drive", "%s", facts->drive) &&
                estimate_set_key(io_frf, "table_crc32", "%08x", (unsigned)self->plan->table->header_crc32) &&
-               estimate_set_key(io_frf, "mode", "%s",
-                                self->plan->mode == drive_mode_cascade ? "cascade" : "torque") &&
+               estimate_set_key(io_frf, "mode", "%s", self->plan->mode == drive_mode_cascade ? "cascade" : "torque") &&
                estimate_set_key(io_frf, "spectra", "%s",
                                 from_means ? "means and variances of the drive" : "periods of the drive");
     if (set && self->unread > 0) {
@@ -129,8 +128,8 @@ static bool set_keys(const struct modbus_response *self, const struct modbus_res
     return set;
 }
 
-static int report(const struct modbus_response *self, const struct modbus_response_facts *facts,
-                  const struct frf *frf, const struct command_context *context, struct error *out_error)
+static int report(const struct modbus_response *self, const struct modbus_response_facts *facts, const struct frf *frf,
+                  const struct command_context *context, struct error *out_error)
 {
     size_t valid = 0;
     for (size_t line = 0; line < frf->count; line++) {
@@ -155,8 +154,9 @@ static int report(const struct modbus_response *self, const struct modbus_respon
     }
     if (!context->quiet) {
         const struct msgen_table *table = self->plan->table;
-        printf("%s: response of %zu lines (%zu valid) from %zu periods of %u samples at %.9g Hz, measured in the drive\n",
-               facts->out, frf->count, valid, frf->periods, (unsigned)table->period_samples, rate_hz(table));
+        printf(
+            "%s: response of %zu lines (%zu valid) from %zu periods of %u samples at %.9g Hz, measured in the drive\n",
+            facts->out, frf->count, valid, frf->periods, (unsigned)table->period_samples, rate_hz(table));
         printf("%u requests, %u repeated, %u replies that were not for their request\n", (unsigned)facts->requests,
                (unsigned)facts->repeated, (unsigned)facts->stale);
     }

@@ -1,0 +1,47 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Frama-C's Eva over lib/: for every value that the drivers of tests/frama-c leave open there is no undefined behaviour (overflow,
+# access outside, uninitialised, division). An alarm fails. Tables' making (math.h) and the kernels in assembly are left to tests.
+# usage: ./run bench frama-c [DRIVER...]      (a few minutes each)
+set -euo pipefail
+cd "$(dirname "$0")/.."
+command -v frama-c >/dev/null || {
+    echo "frama-c is not here (Debian: frama-c-base)" >&2
+    exit 77
+}
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+declare -A sources=(
+    [crc]='lib/core/*.c'
+    [guard]='lib/guard/*.c lib/core/status.c'
+    [table]='lib/msgen/table.c lib/core/crc32.c'
+    [player]='lib/msgen/player.c lib/msgen/table.c lib/core/crc32.c'
+    [dft]='lib/frf/dft.c lib/frf/dft_q15.c lib/frf/dft_q31.c lib/frf/dft_i16.c lib/frf/dft_by_twos.c'
+    [block]='lib/frf/block.c lib/frf/block_kernel.c'
+)
+# The numeric drivers have every loop followed one by one; the guard's has any number of samples, joined.
+declare -A options=(
+    [dft]='-eva-slevel 20000 -eva-auto-loop-unroll 200 -eva-min-loop-unroll 70'
+    [block]='-eva-slevel 20000 -eva-auto-loop-unroll 200 -eva-min-loop-unroll 70'
+    [table]='-eva-slevel 2000 -eva-auto-loop-unroll 300'
+)
+[ $# -gt 0 ] || set -- crc guard table player dft block
+status=0
+for driver in "$@"; do
+    read -ra files < <(eval "echo ${sources[$driver]}")
+    read -ra extra <<<"${options[$driver]:-}"
+    timeout 1800 frama-c -eva -eva-precision 2 -eva-split-return full -eva-no-print -warn-special-float none -machdep gcc_x86_64 \
+        "${extra[@]}" -cpp-extra-args='-Ilib -I. -DSERVOSCOPE_MEMORY_BARRIER\(\)=' "tests/frama-c/drive_$driver.c" "${files[@]}" \
+        >"$log" 2>&1 || {
+        tail -n 5 "$log" >&2
+        status=1
+    }
+    alarms=$(grep -c 'eva:alarm' "$log" || true)
+    summary=$(sed -n 's/^ *\([0-9]* functions analyzed\).*/\1/p; s/^ *In these functions, \(.*coverage\)\./\1/p' "$log" | paste -sd ',')
+    printf 'frama-c %-8s %s alarms; %s\n' "$driver" "$alarms" "${summary:-no result}"
+    if [ "$alarms" -gt 0 ] || [ -z "$summary" ]; then
+        grep -A2 'eva:alarm' "$log" | head -n 20 >&2 || true
+        status=1
+    fi
+done
+exit "$status"
