@@ -43,7 +43,8 @@ int main(void)
         basis[i] = any_i32();
     }
     for (uint32_t i = 0; i < 4; ++i) {
-        /* With any coefficients accumulators fill their 32 bits, where those of a table stay below 2^30: half the factor. */
+        /* With any coefficients accumulators fill their 32 bits, where those of a table stay below 2^30: half the
+         * factor. */
         restore[i] = any_i32() / 2;
     }
     run(&table, false);

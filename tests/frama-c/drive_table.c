@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Any bytes of any length up to two hundred as a table, then played: Eva has to see that nothing beyond them is read. */
+/* Any bytes of any length up to two hundred as a table, then played: Eva has to see that nothing beyond them is read.
+ * */
 #include "tests/frama-c/any.h"
 
 #include "msgen/player.h"

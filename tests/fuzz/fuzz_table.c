@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/// The table loader and its CRC. The first step says how: the bytes as they come, or a good table of which the further steps
-/// change bytes, cut off the end or, the first step willing, put both CRCs right again. Changed and not signed again, no
-/// table may be accepted; whatever is accepted has to be what the format promises, and plays within its limits.
+/// The table loader and its CRC. The first step says how: the bytes as they come, or a good table of which the further
+/// steps change bytes, cut off the end or, the first step willing, put both CRCs right again. Changed and not signed
+/// again, no table may be accepted; whatever is accepted has to be what the format promises, and plays within its
+/// limits.
 #include "core/bytes.h"
 #include "core/crc32.h"
 #include "msgen/player.h"
@@ -97,6 +98,22 @@ static void check_crc(const uint8_t *data, size_t size)
     FUZZ_CHECK(core_crc32(core_crc32(0, data, cut), data + cut, size - cut) == core_crc32(0, data, size));
 }
 
+/// Changes bytes of a good table, step by step; returns how long it is then.
+static size_t change(const uint8_t *data, size_t size, uint8_t *io_bytes, size_t whole)
+{
+    size_t length = whole;
+    for (size_t at = 0; at + fuzz_step_bytes <= size; at += fuzz_step_bytes) {
+        struct fuzz_step step = fuzz_step(data + at);
+        size_t offset = (step.what & 1) ? step.data[0] % 72 : core_get_u16(step.data) % whole;
+        if (step.what % 16 == 2)
+            length = offset;
+        else
+            for (unsigned b = 0; b < step.length && offset + b < whole && b < (step.what >> 4) % 5u; b++)
+                io_bytes[offset + b] = step.data[2 + b];
+    }
+    return length;
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     uint8_t bytes[room_bytes], original[room_bytes];
@@ -112,15 +129,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         length = size - fuzz_step_bytes < room_bytes ? size - fuzz_step_bytes : room_bytes;
         memcpy(bytes, data + fuzz_step_bytes, length);
     }
-    for (size_t at = fuzz_step_bytes; !as_they_come && at + fuzz_step_bytes <= size; at += fuzz_step_bytes) {
-        struct fuzz_step step = fuzz_step(data + at);
-        size_t offset = (step.what & 1) ? step.data[0] % 72 : core_get_u16(step.data) % whole;
-        if (step.what % 16 == 2)
-            length = offset;
-        else
-            for (unsigned b = 0; b < step.length && offset + b < whole && b < (step.what >> 4) % 5u; b++)
-                bytes[offset + b] = step.data[2 + b];
-    }
+    if (!as_they_come)
+        length = change(data + fuzz_step_bytes, size - fuzz_step_bytes, bytes, whole);
     if (signs && !as_they_come)
         sign(bytes, length);
     /* A copy of the exact size, so that a sanitizer sees any read behind it. */

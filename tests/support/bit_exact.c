@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One line of name and CRC-32 for each integer result of lib/: machines of any byte order and word size have to print the
- * same. Numbers are put into bytes before the CRC, so that it does not depend on how they lie in memory. */
+/* One line of name and CRC-32 for each integer result of lib/: machines of any byte order and word size have to print
+ * the same. Numbers are put into bytes before the CRC, so that it does not depend on how they lie in memory. */
 #include "core/bytes.h"
 #include "core/crc32.h"
 #include "frf/block.h"

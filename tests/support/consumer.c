@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a project that has taken lib/ in might do with it: a table's check, a tone's coefficient, a limit. C99 and C++. */
+/* What a project that has taken lib/ in might do with it: a table's check, a tone's coefficient, a limit. C99 and C++.
+ * */
 #ifdef ONE_PAIR_OF_FILES
 #include ONE_PAIR_OF_FILES
 #else

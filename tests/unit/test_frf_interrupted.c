@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The reader of the DFT interrupted by its writer, at every place where the two meet: the memory barriers. Here they are
- * the interrupt, which feeds as many periods as are planned; nothing torn may pass as a period. */
+/* The reader of the DFT interrupted by its writer, at every place where the two meet: the memory barriers. Here they
+ * are the interrupt, which feeds as many periods as are planned; nothing torn may pass as a period. */
 static void interrupt_now(void);
 #define SERVOSCOPE_MEMORY_BARRIER() interrupt_now()
 #include "frf/dft.c"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* MC/DC of lib/guard by table: for each condition of each decision two vectors of which only that condition decides, so that
- * the outcome differs. The table is held against the sources: a condition that is added there without a row here fails. */
+/* MC/DC of lib/guard by table: for each condition of each decision two vectors of which only that condition decides, so
+ * that the outcome differs. The table is held against the sources: a condition that is added there without a row here
+ * fails. */
 #include "guard/guard.h"
 #include "guard/guard_real.h"
 #include "guard/latch.h"
