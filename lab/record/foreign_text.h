@@ -39,9 +39,10 @@ bool foreign_number(char *cell, char decimal, double *out_value);
 /// A column's name with its unit as words behind it, "pos [mm]"; characters that a map could not hold become '_'.
 void foreign_name(const char *name, const char *unit, char *out_name, size_t size);
 
-/// Makes a run of a table whose columns are called "NAME [unit]", or "NAME" where the file gives no unit: by --map, whose
-/// COLUMN may leave the unit away, else by the units (run_guess.h). A unit in the header is honoured: where the map gives no factor it
-/// brings the one to SI, where it gives one both are said. The table is empty afterwards in every case.
+/// Makes a run of a table whose columns are called "NAME [unit]", or "NAME" where the file gives no unit: by --map,
+/// whose COLUMN may leave the unit away, else by the units (run_guess.h). A unit in the header is honoured: where the
+/// map gives no factor it brings the one to SI, where it gives one both are said. The table is empty afterwards in
+/// every case.
 /// Errors: error_refused, error_usage
 int foreign_take_run(struct text_table *io_table, const struct format_options *options, struct run *out_run,
                      struct format_notes *io_notes, struct error *out_error);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// A gnuplot script with the numbers in it: a plot that can be looked at at once (`gnuplot -p FILE.gp`) and changed at will.
+/// A gnuplot script with the numbers in it: a plot that can be looked at at once (`gnuplot -p FILE.gp`) and changed at
+/// will.
 #include "lab/record/atomic_file.h"
 #include "lab/record/format.h"
 #include "lab/record/frf_file.h"

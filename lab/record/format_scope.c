@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/// Text exports of the TwinCAT Scope: a head, one row for each property of the channels (name, sample time, unit, ...), then
-/// values, each group of channels behind its own column of time stamps in milliseconds. Separator and decimal mark are
-/// settings of whoever exported it.
+/// Text exports of the TwinCAT Scope: a head, one row for each property of the channels (name, sample time, unit, ...),
+/// then values, each group of channels behind its own column of time stamps in milliseconds. Separator and decimal mark
+/// are settings of whoever exported it.
 #include "lab/record/foreign_text.h"
 #include "lab/record/format.h"
 #include "lab/record/record_table.h"

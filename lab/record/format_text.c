@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/// Recordings of other programs as text: cells between tabs, semicolons, commas or blanks, a point or a comma as decimal
-/// mark, lines of anything in front, one row of names, perhaps a row of units. What was assumed of them is noted.
+/// Recordings of other programs as text: cells between tabs, semicolons, commas or blanks, a point or a comma as
+/// decimal mark, lines of anything in front, one row of names, perhaps a row of units. What was assumed of them is
+/// noted.
 #include "lab/record/foreign_text.h"
 #include "lab/record/format.h"
 #include "lab/record/record_table.h"
@@ -135,25 +136,37 @@ static bool is_units_row(const struct foreign_text *text, size_t line, const str
     return all;
 }
 
-static int find_layout(const struct foreign_text *text, struct layout *out, struct error *out_error)
+/// A comma in one of the last lines is a decimal mark wherever commas do not separate and points do not mark decimals.
+static char find_decimal(const struct foreign_text *text, char separator)
 {
-    *out = (struct layout){.separator = find_separator(text), .decimal = '.', .names = SIZE_MAX, .units = SIZE_MAX};
-    const size_t last = text->count ? text->count - 1 : 0;
-    for (size_t line = last; text->count && line + sampled_lines > last && line > 0; line--)
-        if (out->separator != ',' && strchr(text->lines[line], ',') && !strchr(text->lines[line], '.'))
-            out->decimal = ',';
-    size_t line = 0;
-    while (line < text->count && (out->columns = count_numbers(text, line, out)) == 0)
-        line++;
-    out->first = line;
-    if (line == text->count)
-        return error_set(out_error, error_refused, "%s: no row of numbers was found", text->path);
+    const size_t from = text->count > sampled_lines ? text->count - sampled_lines : 0;
+    for (size_t line = from; line < text->count && separator != ','; line++)
+        if (strchr(text->lines[line], ',') && !strchr(text->lines[line], '.'))
+            return ',';
+    return '.';
+}
+
+/// The rows of names and units are the last in front of the numbers, blank lines and comments aside.
+static void find_names(const struct foreign_text *text, struct layout *io)
+{
+    size_t line = io->first;
     while (line > 0 && (is_blank(text->lines[line - 1]) || text->lines[line - 1][0] == '#'))
         line--;
-    if (line > 1 && is_units_row(text, line - 1, out))
-        out->units = --line;
+    if (line > 1 && is_units_row(text, line - 1, io))
+        io->units = --line;
     if (line > 0)
-        out->names = line - 1;
+        io->names = line - 1;
+}
+
+static int find_layout(const struct foreign_text *text, struct layout *out, struct error *out_error)
+{
+    *out = (struct layout){.separator = find_separator(text), .names = SIZE_MAX, .units = SIZE_MAX};
+    out->decimal = find_decimal(text, out->separator);
+    while (out->first < text->count && (out->columns = count_numbers(text, out->first, out)) == 0)
+        out->first++;
+    if (out->first == text->count)
+        return error_set(out_error, error_refused, "%s: no row of numbers was found", text->path);
+    find_names(text, out);
     if (out->names == SIZE_MAX)
         return error_set(out_error, error_refused, "%s:%zu: expected a row of names in front of the numbers",
                          text->path, out->first + 1);

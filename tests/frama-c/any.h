@@ -5,6 +5,7 @@
 
 #include "core/real.h"
 
+#include <__fc_builtin.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -32,11 +33,20 @@ static inline bool any_bool(void)
     return any_word % 2u != 0u;
 }
 
-/* low .. high */
+/* low .. high. The analyser's own: written out in C it would be three cases, and those of every sample multiply. */
 static inline uint32_t any_between(uint32_t low, uint32_t high)
 {
-    uint32_t value = any_word;
-    return value < low ? low : value > high ? high : value;
+    return Frama_C_unsigned_int_interval(low, high);
+}
+
+static inline int16_t any_i16_between(int16_t low, int16_t high)
+{
+    return (int16_t)Frama_C_interval(low, high);
+}
+
+static inline uint8_t any_u8(void)
+{
+    return (uint8_t)Frama_C_unsigned_int_interval(0, 255);
 }
 
 #endif

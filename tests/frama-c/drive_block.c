@@ -22,7 +22,7 @@ static void run(const struct frf_block_table *table, bool spread)
     static const uint32_t counts[3] = {3, period, period + 5}, gaps[3] = {0, 2, 7};
     for (uint32_t call = 0; call < 3; ++call) {
         for (uint32_t i = 0; i < 2u * period; ++i) {
-            samples[i] = (int16_t)((int32_t)(any_u32() & 0xFFFFu) - 32768);
+            samples[i] = any_i16_between(INT16_MIN, INT16_MAX);
         }
         frf_block_add_i16(&dft, samples, counts[call]);
         frf_block_skip(&dft, gaps[call]);

@@ -20,7 +20,7 @@ static void run(struct frf_dft *dft)
     struct frf_period latched;
     for (uint32_t call = 0; call < 4; ++call) {
         for (uint32_t i = 0; i < 2u * period * channels; ++i) {
-            samples[i] = (int16_t)((int32_t)any_between(1, 65534) - 32768);
+            samples[i] = any_i16_between(INT16_MIN + 1, INT16_MAX - 1);
         }
         samples[call] = call % 2u == 0 ? INT16_MIN : INT16_MAX;
         frf_dft_add_i16(dft, samples, counts[call]);
@@ -41,7 +41,7 @@ int main(void)
     struct frf_dft_config config = {bins, bin_count, channels, storage, words, -32768, 32767};
     struct frf_dft dft;
     for (uint32_t i = 0; i < FRF_TWIDDLE_WORDS(8u); ++i) {
-        factors_q15[i] = (int16_t)((int32_t)any_between(0, 2u * FRF_Q15_ONE) - FRF_Q15_ONE);
+        factors_q15[i] = any_i16_between(-FRF_Q15_ONE, FRF_Q15_ONE);
         factors_q31[i] = any_i32();
     }
     if (frf_dft_init_q15(&dft, &config, &q15) == core_ok) {

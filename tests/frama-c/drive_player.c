@@ -32,7 +32,7 @@ int main(void)
     static uint8_t samples[period * msgen_channels_max * 4];
     struct msgen_table table = {0};
     for (uint32_t i = 0; i < sizeof samples; ++i) {
-        samples[i] = (uint8_t)(any_u32() & 0xFFu);
+        samples[i] = any_u8();
     }
     table.samples = samples;
     table.rate_num_hz = 1000;

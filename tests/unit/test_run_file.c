@@ -136,9 +136,9 @@ static void test_run_read_refuses_what_is_no_table(void)
     refuse("# sample_rate_hz: 1\n", "run.csv:2: the file ends without a row of column names");
     refuse("torque_Nm\n", "run.csv:2: the file ends without a row of numbers");
     refuse("0,1\n2,3\n", "run.csv:1: '0' is a number, the row of column names was expected first");
-    refuse("time_s;torque_Nm\n0,0;1,5\n",
-           "run.csv:1: columns are separated by semicolons: commas were expected, and a point as decimal mark; 'servoscope "
-           "convert' makes such a file of it");
+    refuse("time_s;torque_Nm\n0,0;1,5\n", "run.csv:1: columns are separated by semicolons: commas were expected, and a "
+                                          "point as decimal mark; 'servoscope "
+                                          "convert' makes such a file of it");
     refuse("time_s,torque_Nm\n0,0,1,5\n",
            "run.csv:2: row has 4 cells, the row of names (line 1) has 2: decimal commas? A point was expected");
     refuse("time_s,torque_Nm\n0,1\n2\n", "run.csv:3: row has 1 cells, the row of names (line 1) has 2");

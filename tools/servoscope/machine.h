@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// What this machine has of what a measurement wants: CAN, serial ports, real-time rights, libraries. Nothing is changed
-/// and nothing is sent.
+/// What this machine has of what a measurement wants: CAN, serial ports, real-time rights, libraries. Nothing is
+/// changed and nothing is sent.
 #ifndef SERVOSCOPE_TOOLS_MACHINE_H
 #define SERVOSCOPE_TOOLS_MACHINE_H
 
