@@ -35,9 +35,9 @@ double blackbox_gain(const struct blackbox *self, const struct fit_data *data, c
                      const struct fit *fit, unsigned mask, double *out_cost, double *out_left);
 
 /// What is left of unseen residuals when the black box has learned on others: RMS, to be held against that before.
-/// residual: data->values, what the fit leaves; io_unseen: unseen->values, what its model leaves of runs that it was not
-/// fitted to, and then what the black box leaves of that. Knots divide the range of the first run of `data`; beyond it
-/// nothing was learned.
+/// residual: data->values, what the fit leaves; io_unseen: unseen->values, what its model leaves of runs that it was
+/// not fitted to, and then what the black box leaves of that. Knots divide the range of the first run of `data`; beyond
+/// it nothing was learned.
 /// Errors: NaN if memory is short
 double blackbox_ceiling(const struct fit_data *data, const double *residual, const struct fit_data *unseen,
                         double *io_unseen);

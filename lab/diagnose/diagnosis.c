@@ -455,8 +455,8 @@ static bool refit_given(struct work *w, struct diagnosis *d, struct hypothesis *
     return true;
 }
 
-/// Estimates the noise and fits with it until neither changes the other. A name that is new was fitted with the noise of
-/// a model without it; what that is off by is not worth another name.
+/// Estimates the noise and fits with it until neither changes the other. A name that is new was fitted with the noise
+/// of a model without it; what that is off by is not worth another name.
 static bool settle_noise(struct work *w, struct hypothesis *h, struct sim_model *io_model)
 {
     enum { most = 4 };

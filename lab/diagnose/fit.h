@@ -40,8 +40,8 @@ bool fit_run(struct fit *self, const struct fit_data *data, struct hypothesis *i
 
 /// The same without derivatives and covariance at the end: a look at what could be had. If `base` (NULL: nothing),
 /// which the hypothesis extends, has the same structure, derivatives by those numbers of the given model that move by a
-/// few percent at most are taken from `base_fit`. It is given up when as much as the last step brought, in each of those
-/// that are left, would not bring the cost below `goal` (INFINITY: any will do).
+/// few percent at most are taken from `base_fit`. It is given up when as much as the last step brought, in each of
+/// those that are left, would not bring the cost below `goal` (INFINITY: any will do).
 bool fit_roughly(struct fit *self, const struct fit_data *data, const struct hypothesis *base,
                  const struct fit *base_fit, struct hypothesis *io_hypothesis, size_t iterations, double goal);
 

@@ -107,8 +107,9 @@ static void smooth(const struct evidence *self, const double *raw)
     }
 }
 
-/// The expected inverse of a covariance estimated from `scatters` complex deviations is n / (n - channels) times that of
-/// the covariance (complex Wishart): without taking this back a perfect model's residual would seem larger than noise.
+/// The expected inverse of a covariance estimated from `scatters` complex deviations is n / (n - channels) times that
+/// of the covariance (complex Wishart): without taking this back a perfect model's residual would seem larger than
+/// noise.
 /// Equation:  E |w_1|^2 = n / (n - 1),  E |w_2|^2 = n^2 / ((n - 1) (n - 2)),  w = L^-1 R, R independent of the estimate
 static void take_bias_back(const struct evidence *self, double scatters, double *io_factor)
 {

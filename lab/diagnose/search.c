@@ -146,8 +146,8 @@ static size_t scan_all(const struct fit_data *data, const struct sim_coverage *c
 }
 
 /// Whether a candidate is to be preferred to the best so far (NULL: none). What a model leaves that is nowhere near
-/// noise has no likelihood worth its digits, so that of two that both leave far more, and gain nearly alike, the simpler
-/// one is taken: the noise estimated under it says the rest.
+/// noise has no likelihood worth its digits, so that of two that both leave far more, and gain nearly alike, the
+/// simpler one is taken: the noise estimated under it says the rest.
 static bool is_preferred(const struct fit_data *data, const struct scan_candidate *candidate, double margin,
                          const struct scan_candidate *best, double best_margin)
 {

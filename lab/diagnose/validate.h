@@ -15,7 +15,8 @@
 ///            for the measured motion is off from the measured torque; the second, there only with a torque reference,
 ///            is
 ///            what the model's actuator is off, which the first cannot see.
-///            whitened_rms^2 = (X + S) / (P n),  mean_rms^2 = X / n,  with X the sum of the n squared whitened residuals
+///            whitened_rms^2 = (X + S) / (P n),  mean_rms^2 = X / n,  with X the sum of the n squared whitened
+///            residuals
 ///            of the mean of P periods and S that of what differs between the periods, under the model that the noise
 ///            was estimated with, and what effects in time change of it.
 struct diagnosis_figures validate_figures(const struct fit_data *data, const struct sim_model *model);

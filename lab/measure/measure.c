@@ -220,6 +220,7 @@ struct loop {
     struct recorder recorder;
     struct drive_sample sample; ///< the last one
     bool stopping;              ///< the ramp down has begun: nothing more is kept
+    uint32_t late_before;       ///< samples_late up to the row before
     struct measure_report *report;
 };
 
@@ -320,11 +321,29 @@ static int exchange(struct loop *self, const struct drive_setpoint *setpoint, st
     return status == drive_ok ? 0 : note_drive_failure(self, "exchange", status, out_error);
 }
 
+static uint32_t count_late(const struct loop *self)
+{
+    const struct drive_counters *counters = self->drive->operations->counters(self->drive->self);
+    return counters ? counters->samples_late : 0;
+}
+
+/// Late samples since the row before, in the part of the run that this row belongs to.
+static void note_late(struct loop *self, uint32_t late)
+{
+    struct measure_report *report = self->report;
+    // rows_planned is below 2^61 (its columns have to fit into memory), so that the product does not overflow.
+    const size_t part = report->rows_planned > 0 ? self->recorder.rows * measure_parts / report->rows_planned : 0;
+    report->late_in_part[part < measure_parts ? part : measure_parts - 1] += late - self->late_before;
+    self->late_before = late;
+}
+
 /// Until the player is done; the last set-point, sent when it is, is rest at the position reached.
 static int play(struct loop *self, struct error *out_error)
 {
-    size_t done = 0;
-    size_t total = self->report->rows_planned + lead_and_fade_out(&self->player.config);
+    if (self->plan->live) {
+        atomic_store(&self->plan->live->total,
+                     self->report->rows_planned + lead_and_fade_out(&self->player.config));
+    }
     for (;;) {
         struct drive_setpoint setpoint;
         struct msgen_player_state state = next_setpoint(self, &setpoint);
@@ -333,12 +352,14 @@ static int play(struct loop *self, struct error *out_error)
             return status;
         }
         watch(self);
-        if (state.phase == msgen_phase_playing && !self->stopping) {
+        const bool kept = state.phase == msgen_phase_playing && !self->stopping;
+        const uint32_t late = count_late(self);
+        if (kept) {
+            note_late(self, late);
             recorder_add(&self->recorder, &setpoint, &self->sample);
         }
-        done++;
-        if (self->plan->progress) {
-            self->plan->progress(self->plan->progress_context, done < total ? done : total, total);
+        if (self->plan->live) {
+            measure_live_add(self->plan->live, &self->sample, kept, late);
         }
     }
 }

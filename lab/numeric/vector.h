@@ -5,8 +5,8 @@
 
 #include <stddef.h>
 
-/// sum_i a_i b_i, sum_i a_i, and sum_i a_i^2: several partial sums beside each other, because one would wait for its own
-/// last addition.
+/// sum_i a_i b_i, sum_i a_i, and sum_i a_i^2: several partial sums beside each other, because one would wait for its
+/// own last addition.
 double vector_dot(size_t count, const double *a, const double *b);
 double vector_sum(size_t count, const double *a);
 double vector_power(size_t count, const double *a);

@@ -17,8 +17,8 @@ static void mode_attach(const double *p, struct sim_attached_mass *out_mass)
         .inertia = p[1], .stiffness = p[1] * rate * rate, .damping = 2.0 * p[2] * rate * p[1]};
 }
 
-/// Frequencies from a sixteenth of the highest line to half above it, each felt as far as the next, with a mass so small
-/// that what it does is proportional to it.
+/// Frequencies from a sixteenth of the highest line to half above it, each felt as far as the next, with a mass so
+/// small that what it does is proportional to it.
 static bool mode_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
 {
     const double first = 0.06, last = 1.5, growth = 1.08, share = 0.002, damping_ratio = 0.04;
