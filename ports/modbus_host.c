@@ -1,14 +1,17 @@
 /* SPDX-License-Identifier: MIT */
+#define _GNU_SOURCE
 #include "ports/modbus_host.h"
 
 #include "ports/place.h"
 
 #include <errno.h>
 #include <modbus.h>
+#include <netdb.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <time.h>
 
 enum {
@@ -170,7 +173,8 @@ static struct modbus_port *finish_open(struct modbus_port *self, const char *pla
     // Recovery is ours (settle): the library's may repeat a request or wait without end.
     modbus_set_error_recovery(self->context, MODBUS_ERROR_RECOVERY_NONE);
     if (modbus_connect(self->context) == -1) {
-        return fail(self, out_text, text_size, place, modbus_strerror(errno));
+        return fail(self, out_text, text_size, place,
+                    errno == ENOTTY ? "is no serial device" : modbus_strerror(errno));
     }
     if (!self->tcp) {
         modbus_flush(self->context);
@@ -189,6 +193,15 @@ struct modbus_port *modbus_port_open_tcp(const char *place, const struct modbus_
     }
     char service[8];
     snprintf(service, sizeof service, "%u", (unsigned)port & 0xFFFFu);
+    // The library calls a name that nobody knows a refused connection.
+    const struct addrinfo wanted = {.ai_socktype = SOCK_STREAM};
+    struct addrinfo *found = NULL;
+    const int resolved = getaddrinfo(host, service, &wanted, &found);
+    if (resolved != 0) {
+        snprintf(out_text, text_size, "%s: %s", place, gai_strerror(resolved));
+        return NULL;
+    }
+    freeaddrinfo(found);
     struct modbus_port *self = calloc(1, sizeof *self);
     if (self) {
         self->tcp = true;

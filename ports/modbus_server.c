@@ -154,7 +154,7 @@ bool modbus_server_open_rtu(struct modbus_server *self, struct modbus_map *map, 
     }
     self->line = open(device, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (self->line < 0 || !set_up_line(self->line, speed_of(baud))) {
-        return fail(self, place, strerror(errno), out_text, text_size);
+        return fail(self, place, errno == ENOTTY ? "is no serial device" : strerror(errno), out_text, text_size);
     }
     struct modbus_rtu_timing timing = modbus_rtu_timing_of((uint32_t)baud);
     timing.t15_us = 0;
@@ -272,13 +272,14 @@ static void poll_line(struct modbus_server *self)
     }
 }
 
-static void serve_line(struct modbus_server *self)
+/// `events`: what poll said. An adapter that was pulled out hangs up, and its reads give nothing or fail.
+static void serve_line(struct modbus_server *self, short events)
 {
     uint8_t bytes[modbus_rtu_frame_max];
     ssize_t got = read(self->line, bytes, sizeof bytes);
-    if (got < 0 && errno != EAGAIN && errno != EINTR && errno != EIO) {
-        self->line_lost = true;
-    }
+    bool failed = got < 0 && errno != EAGAIN && errno != EINTR;
+    bool hung_up = got <= 0 && (events & (POLLHUP | POLLERR | POLLNVAL)) != 0;
+    self->line_lost = self->line_lost || failed || hung_up;
     poll_line(self);
     uint64_t arrived_us = now_us();
     for (ssize_t i = 0; i < got; i++) {
@@ -321,7 +322,7 @@ static void serve_ready(struct modbus_server *self, const struct pollfd *files, 
         if (clients[i] == -1) {
             accept_client(self);
         } else if (clients[i] == -2) {
-            serve_line(self);
+            serve_line(self, files[i].revents);
         } else {
             serve_client(self, clients[i]);
         }

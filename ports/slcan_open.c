@@ -215,6 +215,30 @@ bool slcan_connect_serial(struct slcan *self, const char *path, uint32_t bitrate
     return open_channel(self, path, bitrate, out_reason, size);
 }
 
+/// Makes `link` point to the pty. A link that a killed program has left behind is replaced: one to a pty that is gone,
+/// or to the number that has just been given to ours.
+static bool make_link(const char *pty, const char *link)
+{
+    static const char ptys[] = "/dev/pts/";
+    char target[64];
+    if (symlink(pty, link) == 0) {
+        return true;
+    }
+    ssize_t length = errno == EEXIST ? readlink(link, target, sizeof target - 1) : -1;
+    if (length < 0) {
+        errno = errno == EINVAL ? EEXIST : errno; // there is something, and it is no link
+        return false;
+    }
+    target[length] = '\0';
+    bool left_over = strncmp(target, ptys, sizeof ptys - 1) == 0 &&
+                     (strcmp(target, pty) == 0 || (access(target, F_OK) != 0 && errno == ENOENT));
+    if (!left_over) {
+        errno = EEXIST;
+        return false;
+    }
+    return unlink(link) == 0 && symlink(pty, link) == 0;
+}
+
 bool slcan_listen_pty(struct slcan *self, const char *link, char *out_reason, size_t size)
 {
     slcan_line_init(self, true);
@@ -231,7 +255,7 @@ bool slcan_listen_pty(struct slcan *self, const char *link, char *out_reason, si
         slcan_close(self);
         return false;
     }
-    if (link && symlink(self->pty_name, link) != 0) {
+    if (link && !make_link(self->pty_name, link)) {
         snprintf(out_reason, size, "%s: cannot be made a link to %s: %s", link, self->pty_name, strerror(errno));
         slcan_close(self);
         return false;

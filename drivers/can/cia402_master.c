@@ -274,7 +274,11 @@ static enum drive_status enter_operation(struct cia402_master *self)
             self->target.position = self->last.position;
     }
     if (self->missing_in_a_row > self->options.lost_in_a_row) {
-        snprintf(self->detail, sizeof self->detail, "node %u does not answer SYNC", self->options.node_id);
+        if (self->counters.samples_late > 0)
+            snprintf(self->detail, sizeof self->detail, "node %u answers SYNC too late: expected within %lu us",
+                     self->options.node_id, (unsigned long)self->reply_us);
+        else
+            snprintf(self->detail, sizeof self->detail, "node %u does not answer SYNC", self->options.node_id);
         return drive_err_timeout;
     }
     if (self->state == cia402_fault)

@@ -293,11 +293,12 @@ static void keep_tone(struct evidence *c, double *powers, double power, double f
     c->tones_hz[at] = frequency_hz;
 }
 
-/// Mean power about point j, the line itself and its skirt left out: noise may have peaks of its own, narrower than the
-/// whitening knows, where a load swings under it.
-static double power_about(const double *power, size_t points, size_t j, size_t reach)
+/// Evidence in nats for a line at point j against the mean power about it, the line itself and its skirt left out: noise
+/// may have peaks of its own, narrower than the whitening knows, where a load swings under it.
+/// Equation:  m ln(1 + P / (m mean)), the log of how seldom noise does that; a mean of m powers is itself uncertain
+static double line_nats(const struct recording *r, const double *power, size_t points, size_t j)
 {
-    size_t skirt = 2 * padding, count = 0;
+    size_t skirt = 2 * padding, count = 0, reach = padding * (2 * r->periods > 12 ? 2 * r->periods : 12);
     double sum = 0.0;
     for (size_t i = j > reach ? j - reach : 1; i < points && i <= j + reach; i++) {
         if (i + skirt < j || i > j + skirt) {
@@ -305,7 +306,9 @@ static double power_about(const double *power, size_t points, size_t j, size_t r
             count++;
         }
     }
-    return count > 0 ? sum / (double)count : INFINITY;
+    // The harmonics of the period were taken out with the mean, and padding adds points, but no information.
+    double kept = r->periodic ? 1.0 - 1.0 / (double)r->periods : 1.0, m = kept * (double)count / padding;
+    return sum > 0.0 && m > 0.0 ? m * log1p(power[j] / (sum * padding)) : 0.0;
 }
 
 static void pick_tones(const struct evidence *e, const double *power, size_t points, double points_per_bin,
@@ -313,19 +316,19 @@ static void pick_tones(const struct evidence *e, const double *power, size_t poi
 {
     const struct recording *r = e->recording;
     double powers[sim_tones_max], hz_per_point = r->rate_hz / ((double)r->block.samples * points_per_bin);
-    size_t reach = padding * (2 * r->periods > 12 ? 2 * r->periods : 12);
-    // Power over its mean is the line's evidence in nats; as many lines as there are bins were looked at.
-    double chance = 12.0 + log((double)points / padding);
+    double chance = 12.0 + log((double)points / padding); // as many lines as there are bins were looked at
     out->tone_count = 0;
     out->tone_nats = 0.0;
     for (size_t j = 2 * padding; j + 1 < points; j++) {
-        if (!(power[j] >= power[j - 1] && power[j] > power[j + 1]) ||
-            !(power[j] > chance * power_about(power, points, j, reach)))
+        if (!(power[j] >= power[j - 1] && power[j] > power[j + 1]))
+            continue;
+        double nats = line_nats(r, power, points, j);
+        if (!(nats > chance))
             continue;
         double curve = power[j - 1] - 2.0 * power[j] + power[j + 1];
         double shift = curve < 0.0 ? 0.5 * (power[j - 1] - power[j + 1]) / curve : 0.0;
         keep_tone(out, powers, power[j], ((double)j + shift) * hz_per_point);
-        out->tone_nats = fmax(out->tone_nats, power[j] / power_about(power, points, j, reach));
+        out->tone_nats = fmax(out->tone_nats, nats);
     }
 }
 

@@ -8,6 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/// Of a logarithmic coordinate: twice or half.
+static const double farthest_step = 0.7;
+
 bool fit_init(struct fit *self, const struct fit_data *data)
 {
     memset(self, 0, sizeof *self);
@@ -173,9 +176,23 @@ void fit_linear(const struct fit *self, const struct fit_data *data, const struc
     }
 }
 
-/// Solves for the step; coordinates that would leave their box are put on its wall and the others solved again.
-static bool solve_step(const struct fit *self, const struct hypothesis *h, double damping, double *work, double *out_x,
-                       double *out_covariance)
+/// Where a step from the present value may end: within the box, and a ratio not farther than its derivative says
+/// anything.
+static double confined(const struct hypothesis *h, size_t i, double reach, double x)
+{
+    const struct coordinate *c = &h->coordinates[i];
+    double lower = c->lower, upper = c->upper;
+    if (c->scale == coordinate_logarithmic) {
+        lower = fmax(lower, h->x[i] - reach);
+        upper = fmin(upper, h->x[i] + reach);
+    }
+    return fmin(fmax(x, lower), upper);
+}
+
+/// Solves for the step; coordinates that would leave their box, or go farther than `reach` in the logarithm, are put on
+/// its wall and the others solved again.
+static bool solve_step(const struct fit *self, const struct hypothesis *h, double damping, double reach, double *work,
+                       double *out_x, double *out_covariance)
 {
     size_t n = h->count, rows = self->rows;
     bool held[hypothesis_coordinates_max] = {false};
@@ -208,7 +225,7 @@ static bool solve_step(const struct fit *self, const struct hypothesis *h, doubl
         memset(out_covariance, 0, n * n * sizeof *out_covariance);
         for (size_t a = 0; a < m; a++) {
             size_t i = map[a];
-            out_x[i] = fmin(fmax(h->x[i] + step[a], h->coordinates[i].lower), h->coordinates[i].upper);
+            out_x[i] = confined(h, i, reach, h->x[i] + step[a]);
             if (out_x[i] != h->x[i] + step[a])
                 held[i] = again = true;
             for (size_t b = 0; b < m; b++)
@@ -246,13 +263,13 @@ static bool take_step(struct fit *self, const struct fit_data *data, struct hypo
     double cost = residual_at(data, h, x, trial, &rows), before = self->cost;
     *out_taken = cost < before;
     if (!*out_taken) {
-        *io_damping = *io_damping > 0.0 ? *io_damping * 8.0 : 1e-2;
+        *io_damping = *io_damping > 0.0 ? *io_damping * 8.0 : 1e-3;
         return *io_damping < 1e4;
     }
     memcpy(h->x, x, h->count * sizeof *x);
     memcpy(self->residual, trial, rows * sizeof *trial);
     self->cost = cost;
-    *io_damping = *io_damping > 1e-3 ? *io_damping * 0.1 : 0.0;
+    *io_damping = *io_damping > 1e-6 ? *io_damping * 0.1 : 0.0;
     return before - cost > settled;
 }
 
@@ -267,22 +284,25 @@ static bool improve(struct fit *self, const struct fit_data *data, struct hypoth
     double damping = 0.0, x[hypothesis_coordinates_max];
     bool good = true, fresh = false, more = true;
     self->cost = residual_at(data, h, h->x, self->residual, &self->rows);
-    for (size_t i = 0; i < course->iterations && good && more; i++) {
+    const size_t tries = 3; // per iteration: one that fails costs a residual, but no derivatives
+    size_t i = 0;
+    for (size_t tried = 0; i < course->iterations && tried < tries * course->iterations && good && more; tried++) {
         if (!fresh)
             differentiate(self, data, h, lender);
         fresh = true;
-        good = solve_step(self, h, damping, work, x, self->covariance);
+        good = solve_step(self, h, damping, farthest_step, work, x, self->covariance);
         bool taken = false;
-        double before = self->cost, left = (double)(course->iterations - i - 1);
+        double before = self->cost;
         more = good && moved(h, x) && take_step(self, data, h, x, trial, course->settled, &damping, &taken);
+        i += taken;
         if (taken)
-            more = more && self->cost - left * (before - self->cost) < course->goal;
+            more = more && self->cost - (double)(course->iterations - i) * (before - self->cost) < course->goal;
         fresh = !taken;
     }
     if (good && course->finish) {
         if (!fresh)
             differentiate(self, data, h, lender);
-        good = solve_step(self, h, 0.0, work, x, self->covariance);
+        good = solve_step(self, h, 0.0, INFINITY, work, x, self->covariance);
     }
     self->prior = prior_cost(h, h->x);
     free(work);
@@ -322,7 +342,7 @@ bool fit_step(struct fit *self, const struct fit_data *data, const struct hypoth
             differentiate_by(self, data, h, i, column);
     }
     double x[hypothesis_coordinates_max], *trial = work + most * h->count + most;
-    bool good = solve_step(self, h, 0.0, work, x, self->covariance);
+    bool good = solve_step(self, h, 0.0, farthest_step, work, x, self->covariance);
     size_t rows;
     double cost = good ? residual_at(data, h, x, trial, &rows) : INFINITY;
     if (cost < self->cost) {

@@ -51,6 +51,21 @@ static double white_noise(size_t n, const double *x, size_t period)
     return count > 0 ? sqrt(sum / (gain * (double)count)) : 0.0;
 }
 
+/// Squared noise of differentiate()'s output per sample of a position with white noise: what noise adds to the power of
+/// a derivative it does not add to its product with the speed column, and a gain would come out too small.
+static double derivative_noise(double sigma_p, double rate_hz)
+{
+    const double squared_weights = 1.36289; // of differentiate(), both sides
+    return squared_weights * sigma_p * sigma_p * rate_hz * rate_hz;
+}
+
+/// `product` over `power` less the noise in it; one where noise is most of it, which says nothing.
+static double gain_beside_noise(double product, double power, double noise)
+{
+    const double most = 0.75;
+    return power > 0.0 && noise < most * power ? product / (power - noise) : 1.0;
+}
+
 struct agreement {
     double gain;         ///< of the speed column over the derivative of the position
     double delay;        ///< of the speed column, samples
@@ -61,9 +76,11 @@ enum { places = 8 };
 
 /// Gain of the speed column where it is nearest to one: a sensor that is wrong by position is wrong both ways over the
 /// travel, a column in a wrong unit is wrong everywhere.
-static double nearest_gain(size_t n, const double *position, const double *derivative, const double *velocity)
+static double nearest_gain(size_t n, const double *position, const double *derivative, const double *velocity,
+                           double noise)
 {
     double low = INFINITY, high = -INFINITY, dd[places] = {0}, dv[places] = {0}, all = 0.0, best = INFINITY;
+    double samples[places] = {0};
     for (size_t i = 0; i < n; i++) {
         low = fmin(low, position[i]);
         high = fmax(high, position[i]);
@@ -72,6 +89,7 @@ static double nearest_gain(size_t n, const double *position, const double *deriv
         size_t at = (size_t)fmin((position[i] - low) / (high - low) * places, places - 1);
         dd[at] += derivative[i] * derivative[i];
         dv[at] += derivative[i] * velocity[i];
+        samples[at] += 1.0;
         all += derivative[i] * derivative[i];
     }
     const double enough = 0.02; // of the travel's power: a place that was hardly passed says nothing
@@ -79,7 +97,7 @@ static double nearest_gain(size_t n, const double *position, const double *deriv
     for (size_t i = 0; i < places; i++) {
         if (!(dd[i] > enough * all))
             continue;
-        double off = dv[i] / dd[i] - 1.0;
+        double off = gain_beside_noise(dv[i], dd[i], samples[i] * noise) - 1.0;
         above = above || off >= 0.0;
         below = below || off <= 0.0;
         best = fabs(off) < fabs(best) ? off : best;
@@ -89,7 +107,7 @@ static double nearest_gain(size_t n, const double *position, const double *deriv
 
 /// Least squares of speed = gain * derivative - delay * d(derivative)/dn.
 static struct agreement compare_speed(size_t n, const double *position, const double *derivative,
-                                      const double *velocity)
+                                      const double *velocity, double noise)
 {
     double dd = 0.0, dv = 0.0, ss = 0.0, se = 0.0;
     for (size_t i = 6; i + 6 < n; i++) {
@@ -99,8 +117,8 @@ static struct agreement compare_speed(size_t n, const double *position, const do
         ss += slope * slope;
         se += slope * (velocity[i] - derivative[i]);
     }
-    struct agreement a = {dd > 0.0 ? dv / dd : 1.0, ss > 0.0 ? -se / ss : 0.0,
-                          nearest_gain(n, position, derivative, velocity)};
+    struct agreement a = {gain_beside_noise(dv, dd, n > 12 ? (double)(n - 12) * noise : 0.0), ss > 0.0 ? -se / ss : 0.0,
+                          nearest_gain(n, position, derivative, velocity, noise)};
     return a;
 }
 
@@ -238,7 +256,8 @@ static void say_contradiction(const struct agreement *a, char *out_text, size_t 
 static bool from_both(size_t n, double rate_hz, const double *velocity, size_t period, const double *derivative,
                       struct stretch *out, char *out_text, size_t size)
 {
-    struct agreement a = compare_speed(n, out->position, derivative, velocity);
+    double sigma_p = white_noise(n, out->position, period), sigma_v = white_noise(n, velocity, period);
+    struct agreement a = compare_speed(n, out->position, derivative, velocity, derivative_noise(sigma_p, rate_hz));
     const double most_gain = 0.02, most_delay = 0.1;
     if (fabs(a.nearest_gain - 1.0) > most_gain || fabs(a.delay) > most_delay) {
         // Below its corner a low-pass is a delay: only one that takes something away can be told from that.
@@ -254,7 +273,6 @@ static bool from_both(size_t n, double rate_hz, const double *velocity, size_t p
             say_contradiction(&a, out_text, size);
         return false;
     }
-    double sigma_p = white_noise(n, out->position, period), sigma_v = white_noise(n, velocity, period);
     // Torque is held between samples, so speed has kinks, and position samples see their images as motion: an error of
     // (f / f_s)^2 of the speed. Below a fiftieth of the sampling rate that is under a part in two thousand, and fades
     // fast.

@@ -412,6 +412,32 @@ static void fail(size_t count, double *out)
         out[i] = NAN;
 }
 
+/// The mean of periods that were clipped one by one is not the clipped mean of the periods, from which noise is gone:
+/// adds what is between them.
+static bool add_clipped(const struct evidence *self, const struct sim_model *model, double *io_mechanics,
+                        double *io_actuator)
+{
+    const struct recording *r = self->recording;
+    size_t n = r->block.samples, rows = r->all.samples;
+    if (!r->periodic || !io_actuator || !predict_limits(model))
+        return true;
+    double *each = malloc(2 * (rows + n) * sizeof *each), *mean = each + 2 * rows;
+    if (!each)
+        return false;
+    predict_limited(model, &r->all, false, self->scale_inertia, each, each + rows);
+    predict_limited(model, &r->block, true, self->scale_inertia, mean, mean + n);
+    for (size_t i = 0; i < n; i++) {
+        io_mechanics[i] -= mean[i];
+        io_actuator[i] -= mean[n + i];
+        for (size_t p = 0; p < r->periods; p++) {
+            io_mechanics[i] += each[r->starts[p] + i] / (double)r->periods;
+            io_actuator[i] += each[rows + r->starts[p] + i] / (double)r->periods;
+        }
+    }
+    free(each);
+    return true;
+}
+
 /// The same and the contrasts.
 static bool signals(const struct evidence *self, const struct sim_model *model, double *out_mechanics,
                     double *out_actuator, double *out_contrasts)
@@ -420,7 +446,7 @@ static bool signals(const struct evidence *self, const struct sim_model *model, 
     bool in_time = self->contrast.values > 0 && contrast_concerns(model);
     if (!in_time) {
         predict(model, &r->block, r->periodic, self->scale_inertia, out_mechanics, out_actuator);
-        return true;
+        return add_clipped(self, model, out_mechanics, out_actuator);
     }
     struct sim_model aligned;
     double *mean = malloc(r->block.samples * sizeof *mean);
@@ -429,6 +455,7 @@ static bool signals(const struct evidence *self, const struct sim_model *model, 
         predict(&aligned, &r->block, r->periodic, self->scale_inertia, out_mechanics, out_actuator);
         for (size_t i = 0; i < r->block.samples; i++)
             out_mechanics[i] += mean[i];
+        good = add_clipped(self, &aligned, out_mechanics, out_actuator);
     }
     free(mean);
     return good;

@@ -24,9 +24,13 @@ struct oddities {
 void oddities_add(struct oddities *self, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 /// Clipped columns, time stamps that wander, rows that were filled.
-void oddities_of_run(const struct run *run, const struct recording *recording, struct oddities *io_oddities);
+/// Errors: error_refused for a position in counts, a reference in another unit or of another sign than the torque, and
+/// time stamps in ms, each with the --map that mends it
+int oddities_of_run(const struct run *run, const struct recording *recording, struct oddities *io_oddities,
+                    struct error *out_error);
 
-/// The period that the torque has: that of the file, or one row more or less where that repeats clearly better.
+/// The period that the torque has: that of the file, one row more or less where that repeats clearly better, or another
+/// one where that of the file does not repeat at all.
 size_t oddities_period(const struct run *run, const double *torque, struct oddities *io_oddities);
 
 /// The unit that a factor betrays ("degrees instead of rad"), with the scale that --map needs; NULL if it is none.
@@ -34,7 +38,7 @@ size_t oddities_period(const struct run *run, const double *torque, struct oddit
 const char *oddities_unit(double factor, bool linear, bool motion, double *out_scale);
 
 /// Whether motion and torque go together as a model's inertia says: least squares of torque on acceleration.
-/// Errors: error_refused if the factor between the two is that of a unit; a sentence if it is merely large
+/// Errors: error_refused if the factor between the two is that of a unit, or above 100; a sentence if it is merely large
 int oddities_of_inertia(const struct run *run, const struct recording *recording, double inertia,
                         struct oddities *io_oddities, struct error *out_error);
 

@@ -317,6 +317,54 @@ void predict(const struct sim_model *model, const struct stretch *stretch, bool 
     }
 }
 
+/// What the actuator makes of a stretch's reference: at each instant, and on the average until the next, added to
+/// `io_now` and `io_until` times `sign`.
+static void add_made(const struct sim_model *model, const struct stretch *stretch, bool cyclic, double sign,
+                     double *io_now, double *io_until)
+{
+    struct predictor p = {.stretch = stretch, .cyclic = cyclic};
+    sim_stepper_init_quick(&p.stepper, model, 1.0 / (model->sample_rate_hz * (double)stretch->substeps));
+    sim_actuator_init(&p.actuator);
+    size_t first = cyclic ? 0 : stretch->samples; // one period ahead of the one that counts
+    for (size_t m = first; m < 2 * stretch->samples; m++) {
+        size_t n = m % stretch->samples;
+        double sum = 0.0;
+        sim_actuator_hold(&p.actuator, stretch->torque_ref[n]);
+        double now = sim_actuator_now(&p.actuator, &p.stepper);
+        for (size_t i = 0; i < stretch->substeps; i++)
+            sum += sim_actuator_substep(&p.actuator, &p.stepper, i);
+        if (m < stretch->samples)
+            continue;
+        io_now[n] += sign * now;
+        io_until[n] += sign * sum / (double)stretch->substeps;
+    }
+}
+
+bool predict_limits(const struct sim_model *model)
+{
+    for (size_t e = 0; sim_effects[e]; e++)
+        if (model->effect_on[e] && sim_effects[e]->limit)
+            return true;
+    return false;
+}
+
+void predict_limited(const struct sim_model *model, const struct stretch *stretch, bool cyclic, double scale_inertia,
+                     double *out_mechanics, double *out_actuator)
+{
+    struct sim_model unlimited = *model;
+    for (size_t e = 0; sim_effects[e]; e++)
+        unlimited.effect_on[e] = unlimited.effect_on[e] && !sim_effects[e]->limit;
+    memset(out_mechanics, 0, stretch->samples * sizeof *out_mechanics);
+    memset(out_actuator, 0, stretch->samples * sizeof *out_actuator);
+    add_made(&unlimited, stretch, cyclic, 1.0, out_actuator, out_mechanics);
+    add_made(model, stretch, cyclic, -1.0, out_actuator, out_mechanics);
+    double moved = model->motor_inertia_kgm2;
+    if (model->structure == sim_structure_rigid)
+        moved += model->load_inertia_kgm2;
+    for (size_t n = 0; n < stretch->samples; n++)
+        out_mechanics[n] *= scale_inertia / moved;
+}
+
 void predict_kinematics(const struct sim_model *model, const struct stretch *stretch, double *out_kinematics)
 {
     struct sim_stepper stepper;

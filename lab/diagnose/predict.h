@@ -27,4 +27,14 @@ void predict(const struct sim_model *model, const struct stretch *stretch, bool 
 /// Units:     rad/s or m/s
 void predict_kinematics(const struct sim_model *model, const struct stretch *stretch, double *out_kinematics);
 
+/// Whether a model has a limit on what its actuator makes.
+bool predict_limits(const struct sim_model *model);
+
+/// What the limits on the actuator add to predict()'s residuals, to first order: cheap, and enough to say what the mean
+/// of periods that were clipped one by one has over the clipped mean of the periods.
+/// Range:     a stretch with a reference
+/// Shapes:    stretch->samples each
+void predict_limited(const struct sim_model *model, const struct stretch *stretch, bool cyclic, double scale_inertia,
+                     double *out_mechanics, double *out_actuator);
+
 #endif

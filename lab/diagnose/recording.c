@@ -126,6 +126,8 @@ static int take_columns(const struct run *run, struct recording *r, struct error
     double *raw_position = copied(position, run->rows), *raw_velocity = copied(velocity, run->rows);
     bool copies = r->all.torque && (!input.reference || r->all.torque_ref) && (!position || raw_position) &&
                   (!velocity || raw_velocity);
+    if (copies && position && !run->linear)
+        r->turns = repair_unwrap(run->rows, raw_position);
     bool good = copies && fill_columns(r, raw_position, raw_velocity) && take_motion(r, raw_position, raw_velocity);
     free(raw_position);
     free(raw_velocity);
@@ -405,7 +407,9 @@ static int check_scales(const struct run *run, const struct recording *r, struct
 /// What the block is about: band, clock, coverage, and what is odd about the run.
 static int describe(const struct run *run, struct recording *r, struct error *out_error)
 {
-    oddities_of_run(run, r, &r->oddities);
+    int status = oddities_of_run(run, r, &r->oddities, out_error);
+    if (status != 0)
+        return status;
     if (strncmp(r->motion_from, "The speed column", 16) == 0)
         oddities_add(&r->oddities, "%s: %s", run->path ? run->path : "run", r->motion_from);
     choose_band(r);

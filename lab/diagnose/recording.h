@@ -45,6 +45,7 @@ struct recording {
     size_t band; ///< highest bin of the block that is looked at
     struct sim_coverage coverage;
     size_t filled; ///< rows that were not measured, filled with what is about them
+    size_t turns;  ///< how often the position began anew at a turn, before it was put together
     struct repair_finding finding;
     struct oddities oddities;
     char motion_from[280]; ///< one sentence: how the speed was made, with the filter's figures

@@ -28,8 +28,106 @@ static void notice(const struct run *run, bool *rows, bool *io_lost, struct repa
         for (size_t n = 0; n < run->rows; n++)
             io_lost[n] = io_lost[n] || rows[n];
         if (io_finding->effect < 0 || f.evidence > io_finding->evidence)
-            *io_finding = f;
+            *io_finding = f; // spikes are looked for after this
     }
+}
+
+/// Turn of which an angle holds only the rest: jumps by one, and no other step of more than a tenth; 0 if there is none.
+static double find_turn(size_t rows, const double *x, size_t *out_jumps)
+{
+    static const double turns[] = {6.283185307179586, 360.0, 1.0};
+    const double near = 0.1;
+    double low = INFINITY, high = -INFINITY, step = 0.0, least = INFINITY;
+    size_t jumps = 0;
+    for (size_t n = 0; n < rows; n++) {
+        low = fmin(low, x[n]);
+        high = fmax(high, x[n]);
+    }
+    for (size_t n = 1; n < rows; n++) {
+        double d = fabs(x[n] - x[n - 1]);
+        bool jump = d > 0.5 * (high - low);
+        jumps += jump;
+        if (jump)
+            least = fmin(least, d);
+        else
+            step = fmax(step, d);
+    }
+    *out_jumps = jumps;
+    for (size_t i = 0; jumps > 0 && i < sizeof turns / sizeof turns[0]; i++)
+        if (high - low <= (1.0 + 1e-6) * turns[i] && least > (1.0 - near) * turns[i] && step < near * turns[i])
+            return turns[i];
+    return 0.0;
+}
+
+size_t repair_unwrap(size_t rows, double *io_position)
+{
+    size_t jumps;
+    double turn = find_turn(rows, io_position, &jumps), added = 0.0, before = rows > 0 ? io_position[0] : 0.0;
+    for (size_t n = 1; turn > 0.0 && n < rows; n++) {
+        double now = io_position[n];
+        added += now - before > 0.5 * turn ? -turn : now - before < -0.5 * turn ? turn : 0.0;
+        before = now;
+        io_position[n] += added;
+    }
+    return turn > 0.0 ? jumps : 0;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/// How far row n is from the middle of its neighbours.
+static double off_neighbours(const double *x, size_t n)
+{
+    return fabs(x[n] - 0.5 * (x[n - 1] + x[n + 1]));
+}
+
+/// Marks single rows that are far off both neighbours, which agree with each other: nothing that has a mass does that.
+static void find_spikes(size_t rows, const double *x, double *work, bool *io_lost, struct repair_finding *io_finding)
+{
+    const double far = 20.0, of_range = 0.02, agree = 0.25, nearly_all = 0.99, most = 0.003;
+    double low = x[0], high = x[0];
+    for (size_t n = 1; n + 1 < rows; n++) {
+        work[n - 1] = off_neighbours(x, n);
+        low = fmin(low, x[n]);
+        high = fmax(high, x[n]);
+    }
+    qsort(work, rows - 2, sizeof *work, ascending);
+    double usual = work[(size_t)(nearly_all * (double)(rows - 2))], least = fmax(far * usual, of_range * (high - low));
+    for (int marking = 0; marking < 2; marking++) {
+        size_t count = 0;
+        for (size_t n = 1; n + 1 < rows; n++) {
+            double off = off_neighbours(x, n);
+            if (!(off > least) || !(fabs(x[n + 1] - x[n - 1]) < agree * off))
+                continue;
+            count++;
+            if (!marking || io_lost[n])
+                continue;
+            io_lost[n] = true;
+            if (io_finding->spikes++ == 0 || n < io_finding->first_spike)
+                io_finding->first_spike = n;
+        }
+        if ((double)count > most * (double)rows)
+            return; // so many are the signal
+    }
+}
+
+static void notice_spikes(const struct run *run, bool *io_lost, struct repair_finding *io_finding)
+{
+    const double *columns[] = {either(run, "position_rad", "position_m"),
+                               either(run, "velocity_rad_per_s", "velocity_m_per_s")};
+    double *copy = malloc(2 * run->rows * sizeof *copy);
+    for (size_t i = 0; copy && run->rows > 2 && i < 2; i++) {
+        if (!columns[i])
+            continue;
+        memcpy(copy, columns[i], run->rows * sizeof *copy);
+        if (i == 0 && !run->linear)
+            repair_unwrap(run->rows, copy); // an angle that dithers about its zero does not jump away
+        find_spikes(run->rows, copy, copy + run->rows, io_lost, io_finding);
+    }
+    free(copy);
 }
 
 size_t repair_find(const struct run *run, bool *out_lost, struct repair_finding *out_finding)
@@ -43,6 +141,7 @@ size_t repair_find(const struct run *run, bool *out_lost, struct repair_finding 
     if (rows)
         notice(run, rows, out_lost, out_finding);
     free(rows);
+    notice_spikes(run, out_lost, out_finding);
     for (size_t n = 0; n < run->rows; n++)
         count += out_lost[n];
     return count;

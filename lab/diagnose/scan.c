@@ -175,6 +175,7 @@ struct place {
     double promise; ///< what would be left of the cost if its change of the residual had the best size
     double size;    ///< that size, of what was tried
     bool valley;    ///< no neighbour promises more
+    bool lowest;    ///< better as it is than what there was, and than every other place
     const double *values;
     struct hypothesis hypothesis;
 };
@@ -213,10 +214,12 @@ static void look(struct scan *self, int effect, struct place *io_place)
     io_place->promise = fmin(io_place->cost, backward ? self->fit->cost : left);
 }
 
-/// Valleys first, of two alike the one that promises more.
+/// What is better already before what may become so; then valleys, of two alike the one that promises more.
 static int by_promise(const void *a, const void *b)
 {
     const struct place *x = a, *y = b;
+    if (x->lowest != y->lowest)
+        return x->lowest ? -1 : 1;
     if (x->valley != y->valley)
         return x->valley ? -1 : 1;
     return (x->promise > y->promise) - (x->promise < y->promise);
@@ -228,8 +231,17 @@ static int by_cost(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static void mark_valleys(struct place *places, size_t count)
+/// `cost`: of what there was.
+static void mark_valleys(struct place *places, size_t count, double cost)
 {
+    struct place *lowest = NULL;
+    for (size_t i = 0; i < count; i++)
+        if (places[i].cost < cost) {
+            lowest = &places[i];
+            cost = lowest->cost;
+        }
+    if (lowest)
+        lowest->lowest = true;
     for (size_t i = 0; i < count; i++) {
         double before = i > 0 ? places[i - 1].promise : INFINITY;
         double after = i + 1 < count ? places[i + 1].promise : INFINITY;
@@ -262,7 +274,7 @@ static size_t choose_places(struct scan *self, int effect, double values[][sim_e
         hypothesis_name(&out[i].hypothesis, effect, values[i]);
         look(self, effect, &out[i]);
     }
-    mark_valleys(out, count);
+    mark_valleys(out, count, self->fit->cost);
     qsort(out, count, sizeof *out, by_promise);
     while (kept < count && kept < most) {
         if (!(out[kept].promise < self->fit->cost - worth))

@@ -353,6 +353,9 @@ bool search_run(const struct fit_data *data, const struct sim_coverage *coverage
     drop_unneeded(data, io_hypothesis, io_fit);
     if (options->progress && !options->progress(options->user, "searching"))
         return true;
+    for (int e = 0; sim_effects[e]; e++)
+        if (io_hypothesis->named[e] && sim_effects[e]->engage)
+            place_again(data, coverage, e, io_hypothesis, io_fit);
     if (named_count(io_hypothesis) < options->causes_max && add_best(data, coverage, io_hypothesis, io_fit)) {
         place_named_again(data, coverage, io_hypothesis, io_fit);
         drop_unneeded(data, io_hypothesis, io_fit);

@@ -20,7 +20,7 @@ struct measure_live {
     atomic_size_t rows, lost;  ///< kept, and lost among them
     atomic_uint late;
     _Atomic float torque_peak_Nm, velocity_peak_rad_per_s, position_low_rad, position_high_rad; ///< fades included
-    bool period_is_whole; ///< the loop's own: no sample of this period was lost so far
+    bool period_is_whole;     ///< the loop's own: no sample of this period was lost so far
     atomic_size_t last_whole; ///< number of the last period that came whole, from 1; 0: there is none
 };
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/measure/measure.h"
 
-#include "core/bytes.h"
 #include "core/fixed.h"
 #include "lab/measure/recorder.h"
+#include "lab/measure/table_value.h"
 #include "msgen/player.h"
 
 #include <math.h>
@@ -18,40 +18,17 @@ enum { default_lost_in_a_row = 20 };
 /// Room for friction and for the controllers above the table's own torque where nobody has set a limit.
 static const double default_torque_margin = 3.0;
 
-static double rate_hz(const struct msgen_table *table)
+size_t measure_part_of(size_t row, size_t rows_planned)
 {
-    return (double)table->rate_num_hz / (double)table->rate_den;
-}
-
-static double scale_of(const struct msgen_table *table, uint32_t channel)
-{
-    union core_float_bits scale = {.bits = table->scale_bits[channel]};
-    return (double)scale.value;
-}
-
-/// One number of the table in SI units.
-static double table_value(const struct msgen_table *table, uint32_t n, uint32_t channel)
-{
-    if (table->format == msgen_format_f32) {
-        union core_float_bits sample = {.bits = msgen_table_float_bits(table, n, channel)};
-        return (double)sample.value * scale_of(table, channel);
-    }
-    return (double)msgen_table_count(table, n, channel) * scale_of(table, channel);
-}
-
-static double peak_of(const struct msgen_table *table, uint32_t channel)
-{
-    double peak = 0.0;
-    for (uint32_t n = 0; n < table->period_samples; n++) {
-        peak = fmax(peak, fabs(table_value(table, n, channel)));
-    }
-    return peak;
+    return (size_t)((double)row / (double)rows_planned * (double)measure_parts);
 }
 
 /// What the position gains in each period, rad or m.
 static double travel_of(const struct msgen_table *table)
 {
-    return table->travel_q30 ? (double)table->travel_q30 / CORE_Q30_ONE * scale_of(table, msgen_channel_position) : 0.0;
+    return table->travel_q30
+               ? (double)table->travel_q30 / CORE_Q30_ONE * table_value_scale(table, msgen_channel_position)
+               : 0.0;
 }
 
 /// Shortest ramp to the table's mean speed that its own top acceleration would do.
@@ -60,11 +37,11 @@ static double travel_ramp_s(const struct msgen_table *table)
     double step = 0.0;
     for (uint32_t n = 0; n < table->period_samples; n++) {
         uint32_t next = n + 1 < table->period_samples ? n + 1 : 0;
-        step = fmax(step, fabs(table_value(table, next, msgen_channel_velocity) -
-                               table_value(table, n, msgen_channel_velocity)));
+        step = fmax(step, fabs(table_value_at(table, next, msgen_channel_velocity) -
+                               table_value_at(table, n, msgen_channel_velocity)));
     }
-    double acceleration = step * rate_hz(table);
-    double speed = fabs(travel_of(table)) * rate_hz(table) / (double)table->period_samples;
+    double acceleration = step * table_value_rate_hz(table);
+    double speed = fabs(travel_of(table)) * table_value_rate_hz(table) / (double)table->period_samples;
     return acceleration > 0.0 ? 1.5 * speed / acceleration : 0.0;
 }
 
@@ -72,12 +49,12 @@ uint32_t measure_ramp_samples(const struct msgen_table *table, enum drive_mode m
 {
     double ramp_s = shortest_ramp_s;
     if (mode == drive_mode_cascade && table->channels == msgen_channels_max) {
-        double velocity = peak_of(table, msgen_channel_velocity);
-        double position = peak_of(table, msgen_channel_position);
+        double velocity = table_value_peak(table, msgen_channel_velocity);
+        double position = table_value_peak(table, msgen_channel_position);
         ramp_s = velocity > 0.0 ? fmax(ramp_s, 1.5 * position / velocity) : ramp_s;
         ramp_s = table->travel_q30 ? fmax(ramp_s, travel_ramp_s(table)) : ramp_s;
     }
-    return (uint32_t)ceil(fmin(ramp_s, longest_ramp_s) * rate_hz(table));
+    return (uint32_t)ceil(fmin(ramp_s, longest_ramp_s) * table_value_rate_hz(table));
 }
 
 /// What the player's ramps may be at most, and at least one sample.
@@ -89,7 +66,7 @@ static uint32_t ramp_or_default(const struct measure_plan *plan, uint32_t wanted
 
 static uint32_t dwell_samples(const struct msgen_table *table)
 {
-    return (uint32_t)fmin(ceil(measure_dwell_s * rate_hz(table)), msgen_ramp_samples_max);
+    return (uint32_t)fmin(ceil(measure_dwell_s * table_value_rate_hz(table)), msgen_ramp_samples_max);
 }
 
 static struct msgen_player_config player_config(const struct measure_plan *plan)
@@ -121,7 +98,7 @@ static struct range position_range(const struct msgen_table *table)
 {
     struct range range = {0.0, 0.0}; // where the axis stands before and after
     for (uint32_t n = 0; n < table->period_samples; n++) {
-        double position = table_value(table, n, msgen_channel_position);
+        double position = table_value_at(table, n, msgen_channel_position);
         range.low = fmin(range.low, position);
         range.high = fmax(range.high, position);
     }
@@ -143,7 +120,7 @@ static int check_travel_range(const struct measure_plan *plan, struct error *out
     double room = travel > 0.0 ? limits->position_max_rad - range.high : range.low - limits->position_min_rad;
     double accepted = fmax(0.0, floor(room / fabs(travel) - ramps));
     double counts = (periods + ramps) * fabs(travel) + fmax(range.high, -range.low);
-    double counts_max = (double)INT32_MAX * scale_of(table, msgen_channel_position);
+    double counts_max = (double)INT32_MAX * table_value_scale(table, msgen_channel_position);
     range.low += fmin(0.0, travel * (periods + ramps));
     range.high += fmax(0.0, travel * (periods + ramps));
     if (!(range.low >= limits->position_min_rad && range.high <= limits->position_max_rad)) {
@@ -172,7 +149,7 @@ static int check_travel(const struct measure_plan *plan, struct error *out_error
         return error_set(out_error, error_refused,
                          "the table moves at a constant speed of %.6g %s under its multisine, which torque mode cannot "
                          "hold: expected --mode cascade, or a table without bias velocity",
-                         travel_of(table) * rate_hz(table) / (double)table->period_samples,
+                         travel_of(table) * table_value_rate_hz(table) / (double)table->period_samples,
                          table->linear ? "m/s" : "rad/s");
     }
     return check_travel_range(plan, out_error);
@@ -201,7 +178,7 @@ int measure_check(const struct measure_plan *plan, struct error *out_error)
     if (status != core_ok) {
         return error_set(out_error, error_usage, "limits: %s", core_status_str(status));
     }
-    double torque = peak_of(table, msgen_channel_torque);
+    double torque = table_value_peak(table, msgen_channel_torque);
     if (torque > plan->limits.torque_max_Nm) {
         return error_set(
             out_error, error_refused,
@@ -299,13 +276,13 @@ static struct msgen_player_state next_setpoint(struct loop *self, struct drive_s
         float samples[msgen_channels_max] = {0.0f, 0.0f, 0.0f};
         state = msgen_player_step_f32(&self->player, samples);
         for (uint32_t c = 0; c < table->channels; c++) {
-            values[c] = (double)samples[c] * scale_of(table, c);
+            values[c] = (double)samples[c] * table_value_scale(table, c);
         }
     } else {
         int32_t samples[msgen_channels_max] = {0, 0, 0};
         state = msgen_player_step(&self->player, samples);
         for (uint32_t c = 0; c < table->channels; c++) {
-            values[c] = (double)samples[c] * scale_of(table, c);
+            values[c] = (double)samples[c] * table_value_scale(table, c);
         }
     }
     out_setpoint->torque_Nm = guard_real_clip_torque(&self->guard, values[msgen_channel_torque]);
@@ -327,13 +304,13 @@ static uint32_t count_late(const struct loop *self)
     return counters ? counters->samples_late : 0;
 }
 
-/// Late samples since the row before, in the part of the run that this row belongs to.
-static void note_late(struct loop *self, uint32_t late)
+/// Counts what was late since the sample before, in the part of the run that its row belongs to.
+static void note_late(struct loop *self, bool kept, uint32_t late)
 {
-    struct measure_report *report = self->report;
-    // rows_planned is below 2^61 (its columns have to fit into memory), so that the product does not overflow.
-    const size_t part = report->rows_planned > 0 ? self->recorder.rows * measure_parts / report->rows_planned : 0;
-    report->late_in_part[part < measure_parts ? part : measure_parts - 1] += late - self->late_before;
+    if (kept && late != self->late_before) {
+        self->report->late_in_part[measure_part_of(self->recorder.rows, self->report->rows_planned)] +=
+            late - self->late_before;
+    }
     self->late_before = late;
 }
 
@@ -341,8 +318,7 @@ static void note_late(struct loop *self, uint32_t late)
 static int play(struct loop *self, struct error *out_error)
 {
     if (self->plan->live) {
-        atomic_store(&self->plan->live->total,
-                     self->report->rows_planned + lead_and_fade_out(&self->player.config));
+        atomic_store(&self->plan->live->total, self->report->rows_planned + lead_and_fade_out(&self->player.config));
     }
     for (;;) {
         struct drive_setpoint setpoint;
@@ -354,8 +330,8 @@ static int play(struct loop *self, struct error *out_error)
         watch(self);
         const bool kept = state.phase == msgen_phase_playing && !self->stopping;
         const uint32_t late = count_late(self);
+        note_late(self, kept, late);
         if (kept) {
-            note_late(self, late);
             recorder_add(&self->recorder, &setpoint, &self->sample);
         }
         if (self->plan->live) {
@@ -392,10 +368,10 @@ static int open_drive(struct loop *self, struct error *out_error)
 {
     const struct measure_plan *plan = self->plan;
     bool limited = plan->limits.torque_max_Nm < CORE_REAL_MAX;
-    double peak = peak_of(plan->table, msgen_channel_torque);
+    double peak = table_value_peak(plan->table, msgen_channel_torque);
     struct drive_configuration configuration = {
         .mode = plan->mode,
-        .sample_rate_hz = rate_hz(plan->table),
+        .sample_rate_hz = table_value_rate_hz(plan->table),
         .torque_limit_Nm = limited ? plan->limits.torque_max_Nm : default_torque_margin * peak,
         .velocity_limit_rad_per_s =
             plan->limits.velocity_max_rad_per_s < CORE_REAL_MAX ? plan->limits.velocity_max_rad_per_s : 0.0,
@@ -410,8 +386,8 @@ static int prepare(struct loop *self, struct error *out_error)
     const struct measure_plan *plan = self->plan;
     struct guard_real_limits limits = plan->limits;
     limits.watchdog_samples = plan->lost_in_a_row_max ? plan->lost_in_a_row_max : default_lost_in_a_row;
-    limits.watchdog_samples =
-        (uint32_t)fmax(limits.watchdog_samples, fmin(ceil(plan->lost_for_s * rate_hz(plan->table)), UINT32_MAX));
+    limits.watchdog_samples = (uint32_t)fmax(
+        limits.watchdog_samples, fmin(ceil(plan->lost_for_s * table_value_rate_hz(plan->table)), UINT32_MAX));
     const struct msgen_player_config config = player_config(plan);
     enum core_status status = guard_real_init(&self->guard, &limits);
     if (status == core_ok) {
@@ -442,7 +418,7 @@ static int finish_run(struct loop *self, struct run *out_run, struct error *out_
     report->end_position_rad = self->sample.position_rad;
     struct recorder_facts facts = {
         .table = plan->table,
-        .sample_rate_hz = rate_hz(plan->table),
+        .sample_rate_hz = table_value_rate_hz(plan->table),
         .settle_periods = plan->settle_periods,
         .mode = plan->mode == drive_mode_cascade ? "cascade" : "torque",
         .samples_late = report->counters.samples_late,
@@ -475,6 +451,7 @@ int measure_run(const struct drive *drive, const struct measure_plan *plan, stru
     }
     status = open_drive(&loop, out_error);
     status = status ? status : arm(&loop, out_error);
+    loop.late_before = count_late(&loop);
     status = status ? status : play(&loop, out_error);
     enum drive_status stopped = drive->operations->stop(drive->self);
     if (!status && stopped != drive_ok) {

@@ -15,6 +15,7 @@
 
 #include "drivers/drive.h"
 #include "guard/guard_real.h"
+#include "lab/measure/live.h"
 #include "lab/record/error.h"
 #include "lab/record/run.h"
 #include "msgen/table.h"
@@ -43,9 +44,7 @@ struct measure_plan {
     double following_error_rad; ///< > 0: set in the drive
     /// Set to non-zero from a signal handler or another thread: ramp down and stop. NULL: nobody asks.
     const volatile sig_atomic_t *stop_requested;
-    /// Called after each sample, from the loop: has to return fast. NULL: nobody looks.
-    void (*progress)(void *context, size_t samples_done, size_t samples_total);
-    void *progress_context;
+    struct measure_live *live; ///< told of each sample, for another thread to look at; NULL: nobody looks
 };
 
 enum measure_end {
@@ -55,6 +54,8 @@ enum measure_end {
     measure_failed,      ///< the drive: fault, bus, no answer
 };
 
+enum { measure_parts = 100 };
+
 struct measure_report {
     enum measure_end end;
     char stopped_by[256]; ///< one line for a person; empty if complete
@@ -62,7 +63,9 @@ struct measure_report {
     size_t rows_planned;
     size_t rows_lost;        ///< of those kept, marked valid = 0
     uint32_t torque_clipped; ///< set-points clipped to the torque limit
-    double end_position_rad; ///< of the last sample, after the fade out, from where the axis stood at arm
+    uint32_t
+        late_in_part[measure_parts]; ///< late samples in each hundredth of the planned rows; not those of the fades
+    double end_position_rad;         ///< of the last sample, after the fade out, from where the axis stood at arm
     struct drive_counters counters;
 };
 
@@ -78,6 +81,9 @@ extern const double measure_dwell_s;
 ///            A table that travels at V: at least 1.5 |V| / max|acceleration| too, so that setting off asks for no more
 ///            than the table's own top acceleration
 uint32_t measure_ramp_samples(const struct msgen_table *table, enum drive_mode mode);
+
+/// Which hundredth of a run a row belongs to. Range: row < rows_planned
+size_t measure_part_of(size_t row, size_t rows_planned);
 
 /// Checks a plan against its table without touching a drive.
 /// Errors: error_usage or error_refused: no periods, channels that the mode needs are missing, more rows than memory

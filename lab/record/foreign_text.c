@@ -166,12 +166,12 @@ static const char *find_column(const struct text_table *table, const char *sourc
 static void note_unit(const struct run_map_entry *entry, const char *column, double scale,
                       struct format_notes *io_notes)
 {
-    const char *unit = strrchr(column, '[');
-    double known;
-    if (unit && !run_guess_scale(column, &known)) {
+    double factor;
+    const bool known = run_guess_scale(column, &factor);
+    if (!known && strrchr(column, '[')) {
         format_notes_add(io_notes, format_assumed, "%s: the unit of %s is none that is known; its values times %g",
                          entry->name, column, entry->scale);
-    } else if (!unit) {
+    } else if (!known) {
         format_notes_add(io_notes, format_assumed, "%s: the file gives %s no unit; its values times %g", entry->name,
                          column, entry->scale);
     } else if (entry->scale == 1.0) {
@@ -207,6 +207,16 @@ static char *resolve_map(const struct text_table *table, const struct run_map *m
     return fclose(stream) == 0 ? text : NULL;
 }
 
+/// A column whose place could not be guessed is no loss, but one to know of.
+static void note_unnamed(const struct run *run, struct format_notes *io_notes)
+{
+    for (size_t c = 0; c < run->column_count; c++) {
+        const char *name = run->columns[c].name;
+        if (run_name_axis(name) == run_axis_unknown && strcmp(name, "t_s") != 0)
+            format_notes_add(io_notes, format_kept, "%s under its own name: what it is can be said with --map", name);
+    }
+}
+
 int foreign_take_run(struct text_table *io_table, const struct format_options *options, struct run *out_run,
                      struct format_notes *io_notes, struct error *out_error)
 {
@@ -221,6 +231,8 @@ int foreign_take_run(struct text_table *io_table, const struct format_options *o
     run_options.map = text;
     if (!status)
         status = run_take_table(io_table, &run_options, out_run, out_error);
+    if (!status && guessed)
+        note_unnamed(out_run, io_notes);
     text_table_free(io_table);
     free(text);
     run_map_free(&map);

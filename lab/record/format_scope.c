@@ -254,6 +254,30 @@ static int add_channel(struct text_table *table, const char *name, const double 
     return record_table_add_column(table, name, data, rows, out_error);
 }
 
+/// The common times, and the lines of the file that they stand in.
+static int add_time(const struct scope *self, struct text_table *table, const double *values, size_t width, size_t cell,
+                    struct run_of_values at, size_t stride, size_t rows, struct error *out_error)
+{
+    const int status = add_channel(table, "time_s", values, width, cell, at, stride, rows, 1e-3, out_error);
+    for (size_t n = 0; !status && n < rows; n++)
+        table->row_line[n] = self->first + at.first + n * stride + 1;
+    return status;
+}
+
+/// Channels begin and end a row apart; more is a hole in the shorter one, and what follows it is lost.
+static void note_shortest(const struct scope *self, const struct run_of_values *at, size_t rows,
+                          struct format_notes *io_notes)
+{
+    size_t longest = 0;
+    for (size_t i = 0; at && i < self->count; i++)
+        longest = at[i].count > longest ? at[i].count : longest;
+    for (size_t i = 0; at && i < self->count; i++)
+        if (at[i].count == rows && longest > rows + 1) {
+            format_notes_add(io_notes, format_lost, "%s: has %zu values in a row, others %zu: only so many are kept",
+                             self->channels[i].name, rows, longest);
+        }
+}
+
 /// Channels that have values at the common times become columns, as long as the shortest of them.
 static int make_table(struct scope *self, double step_ms, const double *values, size_t width, struct text_table *table,
                       struct format_notes *io_notes, struct error *out_error)
@@ -269,6 +293,7 @@ static int make_table(struct scope *self, double step_ms, const double *values, 
         note_channel(&self->channels[i], stride, at[i].count, step_ms, io_notes);
         rows = at[i].count && at[i].count < rows ? at[i].count : rows;
     }
+    note_shortest(self, at, rows, io_notes);
     bool timed = false;
     for (size_t i = 0; i < self->count && !status && rows < SIZE_MAX; i++) {
         const struct channel *channel = &self->channels[i];
@@ -276,7 +301,7 @@ static int make_table(struct scope *self, double step_ms, const double *values, 
         if (at[i].count == 0)
             continue;
         if (!timed)
-            status = add_channel(table, "time_s", values, width, channel->time, at[i], stride, rows, 1e-3, out_error);
+            status = add_time(self, table, values, width, channel->time, at[i], stride, rows, out_error);
         timed = true;
         if (!status)
             status =

@@ -276,6 +276,13 @@ static int fill_table(const struct foreign_text *text, const struct layout *layo
     return status;
 }
 
+/// Line numbers as the file has them, for what is said of a row.
+static void number_lines(struct text_table *io_table, size_t first)
+{
+    for (size_t n = 0; n < io_table->rows; n++)
+        io_table->row_line[n] = first + n + 1;
+}
+
 static int convert(const struct foreign_text *text, const struct format_options *options, struct run *out_run,
                    struct format_notes *io_notes, struct error *out_error)
 {
@@ -301,8 +308,10 @@ static int convert(const struct foreign_text *text, const struct format_options 
     for (size_t c = 0; c < layout.columns && columns; c++)
         free(columns[c]);
     free(columns);
-    if (!status)
+    if (!status) {
+        number_lines(&table, layout.first);
         return foreign_take_run(&table, options, out_run, io_notes, out_error);
+    }
     text_table_free(&table);
     return status;
 }

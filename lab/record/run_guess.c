@@ -105,20 +105,30 @@ static void split_words(const char *name, struct column *out)
     }
 }
 
-static bool equal_without_case(const char *a, const char *b)
+/// Whether a capital begins a word inside a word: ActPos.
+static bool is_hump(const char *word, const char *at)
 {
-    while (*a && tolower((unsigned char)*a) == tolower((unsigned char)*b)) {
-        a++;
-        b++;
+    return at == word || *at == '\0' || (isupper((unsigned char)*at) && islower((unsigned char)at[-1]));
+}
+
+static bool has_part(const char *word, const char *part)
+{
+    const size_t length = strlen(part);
+    for (const char *at = word; strlen(at) >= length; at++) {
+        size_t same = 0;
+        while (same < length && tolower((unsigned char)at[same]) == part[same])
+            same++;
+        if (same == length && is_hump(word, at) && is_hump(word, at + length))
+            return true;
     }
-    return tolower((unsigned char)*a) == tolower((unsigned char)*b);
+    return false;
 }
 
 static bool has_word(const struct column *column, const char *const *list, size_t count)
 {
     for (size_t w = 0; w < column->count; w++)
         for (size_t i = 0; i < count; i++)
-            if (equal_without_case(column->words[w], list[i]))
+            if (has_part(column->words[w], list[i]))
                 return true;
     return false;
 }
@@ -230,7 +240,7 @@ static size_t choose(const struct text_table *table, const struct column *column
 static bool add_entry(struct run_map *io_map, const char *name, const char *source, double scale)
 {
     struct run_map_entry *entry = &io_map->entries[io_map->count];
-    *entry = (struct run_map_entry){strdup(name), strdup(source), scale};
+    *entry = (struct run_map_entry){strdup(name), strdup(source), scale, true};
     io_map->count++;
     return entry->name && entry->source;
 }

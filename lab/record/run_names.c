@@ -2,6 +2,7 @@
 #include "lab/record/run_names.h"
 
 #include "lab/record/number.h"
+#include "lab/record/run_guess.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -86,7 +87,8 @@ static int parse_entry(const char *at, const char *end, struct run_map *map, str
         return part_error(at, end, "NAME=COLUMN or NAME=COLUMN*SCALE was expected", out_error);
     const char *star = memchr(equals, '*', (size_t)(end - equals));
     struct run_map_entry *entry = &map->entries[map->count];
-    *entry = (struct run_map_entry){copy_range(at, equals), copy_range(equals + 1, star ? star : end), 1.0};
+    *entry =
+        (struct run_map_entry){copy_range(at, equals), copy_range(equals + 1, star ? star : end), 1.0, star != NULL};
     map->count++;
     if (!entry->name || !entry->source)
         return error_set(out_error, error_refused, "--map: memory is short");
@@ -169,6 +171,34 @@ static int no_such_column(const struct text_table *table, const char *name, stru
                      table->names_line, name, list, used < sizeof list ? "" : " ...");
 }
 
+/* Milliseconds and microseconds, which are no quantity of the motion. */
+static bool time_scale(const char *source, double *out_scale)
+{
+    const size_t length = strlen(source);
+    const char *end = source + length;
+    const size_t bracket = length > 0 && (end[-1] == ']' || end[-1] == ')');
+    const char *unit = end - bracket - 2;
+    if (length < 4 + bracket || unit[1] != 's' || (unit[0] != 'm' && unit[0] != 'u') || !strchr("_ [(", unit[-1]))
+        return false;
+    *out_scale = unit[0] == 'm' ? 1e-3 : 1e-6;
+    return true;
+}
+
+/* A name that ends in another unit than SI's asks for a factor: degrees are not taken for radians in silence. */
+static int check_unit(const struct run_map_entry *entry, const struct text_table *table, struct error *out_error)
+{
+    double scale = 1.0;
+    const bool known =
+        strcmp(entry->name, "time_s") == 0 ? time_scale(entry->source, &scale) : run_guess_scale(entry->source, &scale);
+    if (entry->scaled || !known || scale == 1.0)
+        return error_none;
+    return error_set(out_error, error_refused,
+                     "%s:%zu: --map: %s=%s: the column's name says another unit; expected %s=%s*%.9g, or %s*1 if the "
+                     "name is wrong",
+                     table->path, table->names_line, entry->name, entry->source, entry->name, entry->source, scale,
+                     entry->source);
+}
+
 /* One column of the table becomes what an entry says. `renamed` holds new names of the file's own columns. */
 static int apply_entry(const struct run_map_entry *entry, struct text_table *table, char **renamed,
                        struct run_map_plan *io_plan, struct error *out_error)
@@ -178,6 +208,9 @@ static int apply_entry(const struct run_map_entry *entry, struct text_table *tab
         source++;
     if (source == io_plan->own_count)
         return no_such_column(table, entry->source, out_error);
+    int status = check_unit(entry, table, out_error);
+    if (status)
+        return status;
     char *name = copy_range(entry->name, entry->name + strlen(entry->name));
     bool second = renamed[source] != NULL;
     double *copy = second && table->rows > 0 ? malloc(table->rows * sizeof *copy) : NULL;

@@ -7,6 +7,7 @@
 #include "lab/record/error.h"
 #include "lab/record/text_table.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 
 enum run_axis {
@@ -23,6 +24,7 @@ struct run_map_entry {
     char *name;   ///< a name that a run knows
     char *source; ///< the column's name in the file
     double scale;
+    bool scaled; ///< a factor was given, 1 if need be: then the unit in the column's name is not asked
 };
 
 /// A parsed --map.

@@ -262,7 +262,7 @@ static void state_assumptions(const struct tune_plant *plant, struct nyquist *io
     const double lower_end_hz = gap_lower_end_hz(plant);
     const int used =
         snprintf(io_nyquist->assumptions[3], size,
-                 "no resonance between two lines has less damping than .01 or raises the open loop by more "
+                 "no resonance between two lines has less damping than 0.01 or raises the open loop by more "
                  "than 30 dB");
     if (lower_end_hz > plant->frequency_hz[0]) {
         snprintf(io_nyquist->assumptions[3] + used, size - (size_t)used,

@@ -54,6 +54,11 @@ refuse 1 "no channel has values at that sample time" scope.csv x.csv --rate 300
 refuse 1 "there" scope.csv x.csv --map torque_Nm=nothing
 sed '20s/;[^;]*$/;abc/' scope.csv >bad.csv
 refuse 1 "bad.csv:20: cell 8: 'abc' is not a number" bad.csv x.csv
+sed '21,24d' scope.csv >bad.csv
+refuse 1 "bad.csv:22: time_s: 0.007 follows 0.004: 2 samples are missing" bad.csv x.csv
+awk -F';' -v OFS=';' 'NR == 500 { $5 = "" } 1' scope.csv >hole.csv
+"$SERVOSCOPE" convert hole.csv mapped.csv >said || fail "hole.csv: status $?"
+grep -q 'lost: angle \[deg\]: has 488 values in a row, others 1500: only so many are kept' said || fail "$(cat said)"
 sed '11,$d' scope.csv >bad.csv
 refuse 1 "expected a row of names that begins with 'Name', a blank line, values" bad.csv x.csv
 
@@ -67,6 +72,16 @@ grep -q 'cells between semicolons, decimal comma, names in line 4, units behind 
 grep -q 'time_s is Zeit in ms' said || fail "$(cat said)"
 grep -q 'velocity_rad_per_s is Drehzahl \[rpm\] times 0.10472' said || fail "$(cat said)"
 [ "$(sed -n 's/^0.002,//p' run.csv | cut -d, -f1)" = 2.5 ] || fail "$(head -5 run.csv)"
+sed '20,22d' table.csv >bad.csv
+refuse 1 "bad.csv:20: time_s: 0.017 follows 0.013: 3 samples are missing" bad.csv x.csv
+# Names in camel case, as the Scope's are: the set-point is not the measured one.
+printf 'Time [ms];SetPos [deg];ActPos [deg];IqCmd [A];Axis1.ActTorque [A]\n0;0;1;2;3\n1;0;1;2;3\n2;0;1;2;3\n' >camel.csv
+"$SERVOSCOPE" convert camel.csv mapped.csv >said || fail "camel.csv: status $?"
+[ "$(sed -n 2p mapped.csv)" = time_s,position_ref_rad,position_rad,current_ref_A,current_A ] || fail "camel.csv: $(cat said)"
+# A unit behind the name counts as one in brackets does.
+printf 't_s;pos_deg\n0;0\n0,001;1\n0,002;2\n' >suffix.csv
+"$SERVOSCOPE" convert suffix.csv mapped.csv --map position_rad=pos_deg >said || fail "suffix.csv: status $?"
+grep -q 'assumed: position_rad: pos_deg, its unit by the file, times 0.0174533' said || fail "$(cat said)"
 {
     printf '# by hand\ntime\ttorque (Nm)\tangle_deg\n'
     for k in {0..99}; do printf '%d.5\t%d.25\t-1e-%d\n' "$k" "$k" $((k % 5)); done
@@ -87,4 +102,10 @@ refuse 2 "expected csv, gnuplot" table.csv x.csv --to twincat
 # What reads recordings itself says where to go.
 "$SERVOSCOPE" frf table.txt --out x.csv 2>err && fail "frf reads tabs"
 grep -q "'servoscope convert' makes such a file of it" err || fail "$(cat err)"
+# A unit in a mapped column's name is asked for, not passed over; a factor, 1 too, answers.
+printf 'Time_ms,Iq_A,Angle_deg\n0,1,2\n1,2,3\n2,3,4\n' >deg.csv
+refuse 1 "deg.csv:1: --map: position_rad=Angle_deg: the column's name says another unit; expected position_rad=Angle_deg*0.0174532925" \
+    deg.csv x.csv --rate 1000 --map position_rad=Angle_deg
+refuse 1 "time_s=Time_ms*0.001" deg.csv x.csv --map time_s=Time_ms
+"$SERVOSCOPE" convert deg.csv good.csv --map time_s=Time_ms*0.001,position_rad=Angle_deg*1 --quiet || fail "a factor of 1"
 [ "$failures" -eq 0 ]

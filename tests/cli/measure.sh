@@ -71,6 +71,45 @@ grep -qx '# interrupted: true' cut.csv || fail "an interrupted run is not marked
 [ "$(grep -vc '^#' cut.csv)" -lt 2500000 ] || fail "an interrupted run is complete"
 "$SERVOSCOPE" frf cut.csv --settle 0 --out cut-frf.csv --quiet || fail "an interrupted run cannot be read"
 
+# The live view on a terminal: it stands there while it measures and leaves nothing but the summary behind, however it ends.
+live=("$SERVOSCOPE" measure --drive sim:model.json --table table.mst --limit-torque 3 --periods 20000 --out live.csv)
+for how in shown dumb narrow; do
+    python3 "$SERVOSCOPE_SOURCE/tests/cli/measure_live.py" "$how" -- "${live[@]}" >screen || fail "$how: $(cat screen)"
+    grep -q 'interrupted by the user' screen || fail "$how: $(cat screen)"
+    ! grep -qE 'samples/s,|peak|Hz  ' screen || fail "$how: the view is left on the screen: $(cat screen)"
+done
+for option in --quiet --json; do
+    python3 "$SERVOSCOPE_SOURCE/tests/cli/measure_live.py" absent -- "${live[@]}" "$option" >screen || fail "$option: $(cat screen)"
+done
+"${live[@]}" >said 2>err &
+job=$!
+sleep 2.5
+kill -INT "$job"
+wait "$job" || true
+[ "$(wc -l <err)" -eq 1 ] || fail "not quiet when piped: $(cat err)"
+
+# The page: every number from the run, whatever ended it; a sequence has one page for all.
+"$SERVOSCOPE" measure "${all[@]}" --limit-torque 2 --out paged.csv --report paged.html --quiet
+"$SERVOSCOPE" measure "${all[@]}" --mode torque --limit-position 0.005 --out limited.csv --report limited.html --quiet 2>err || true
+python3 - <<'PYTHON' || fail "the page is not the run's"
+import csv, html, re
+def words(name):
+    return " ".join(html.unescape(re.sub(r"<[^>]*>", " ", re.sub(r"(?s)<(style|script|svg).*?</\1>", "", open(name).read()))).split())
+rows = list(csv.DictReader(line for line in open("paged.csv") if not line.startswith("#")))
+peak = max(abs(float(row["torque_Nm"])) for row in rows)
+page = words("paged.html")
+table = re.search(r"torque ([\d.]+) ([\d.]+) 2 ([\d.]+) % ", page)
+assert table, page
+assert abs(float(table[2]) - peak) < 1e-3 * peak and abs(float(table[3]) - 50 * peak) < 0.1, (table[0], peak)
+for expected in ("1 settling and 3 counted periods of 500 samples", "0 of 2000 samples were lost", "Amplitudes at the 50 excited lines"):
+    assert expected in page, (expected, page)
+page = words("limited.html")
+assert "Stopped early" in page and "travel limit" in page, page
+PYTHON
+"$SERVOSCOPE" design --rate 1000 --period 500 --lines octaves:2:100:2 --limit-torque 1 --inertia 0.005 --out sequence --quiet
+"$SERVOSCOPE" measure --drive sim:model.json --table sequence.json --periods 2 --out segments.csv --report segments.html --quiet
+grep -q 'Single periods and the settling within a segment are not shown' segments.html || fail "the page of a sequence"
+
 # Refusals
 refuse 2 '--drive is missing' --table table.mst --periods 3 --out x.csv
 refuse 2 "'nonsense' is no drive that this program can reach; expected sim:MODEL.json" --drive nonsense --table table.mst \
@@ -89,6 +128,9 @@ refuse 1 'nowhere/x.csv: cannot be written' "${all[@]}" --out nowhere/x.csv
 refuse 1 'expected at most the limit of 0.5 Nm' "${all[@]}" --limit-torque 0.5 --out x.csv
 echo '{"structure": "rigid", "mass_kg": 5, "sample_rate_hz": 1000}' >linear.json
 refuse 1 'expected one kind' --drive sim:linear.json --table table.mst --periods 3 --out x.csv
+refuse 1 'nowhere/x.html: cannot be written' "${all[@]}" --out x.csv --report nowhere/x.html
+refuse 2 'would be overwritten' "${all[@]}" --out x.csv --report table.mst
+refuse 2 '--report: a drive on Modbus' --drive modbus-tcp:127.0.0.1:1 --table table.mst --periods 3 --out x.csv --report x.html
 for input in model.json ./table.mst; do
     sum=$(cksum <"$input")
     refuse 2 "$input: would be overwritten" "${all[@]}" --out "$input"

@@ -10,7 +10,8 @@ static const uint32_t bins[2] = {2, 6};
 static int32_t rows[words_max], restore[4], basis[words_max], storage[words_max], part[words_max];
 static int16_t frames[block], samples[2 * period];
 
-/* Cuts, gaps and periods are numbers, so that Eva follows them one by one; samples and coefficients are any. */
+/* Cuts, gaps and periods are numbers, so that Eva follows them one by one; samples and coefficients are any. What one
+ * call leaves is joined before the next. */
 static void run(const struct frf_block_table *table, bool spread)
 {
     struct frf_block dft;
@@ -31,6 +32,7 @@ static void run(const struct frf_block_table *table, bool spread)
             int64_t real, imaginary;
             frf_block_sums(&dft, &latched, any_between(0, 1), 0, &real, &imaginary);
         }
+        //@ slevel merge;
     }
     frf_block_restart(&dft);
 }

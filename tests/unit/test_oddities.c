@@ -167,7 +167,7 @@ static bool is_said_to_be_hushed(double noise_rad)
         random += (double)(state >> 11) / 9007199254740992.0;
         x[n] = sin(two_pi * 7.3 * (double)n / rate_hz) + noise_rad * sqrt(12.0) * random;
     }
-    oddities_of_run(&longer, &nothing, &said);
+    TEST_ASSERT_EQUAL_INT(0, oddities_of_run(&longer, &nothing, &said, &error));
     longer.path = NULL;
     run_free(&longer);
     return said.count == 1 && strstr(said.texts[0], "which no sensor does") != NULL;

@@ -2,6 +2,7 @@
 #include "tools/servoscope/can_bus.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static const char slcan_scheme[] = "slcan:", connect_scheme[] = "slcan-connect:";
@@ -13,13 +14,21 @@ static const char *behind(const char *scheme, const char *name)
     return strncmp(name, scheme, length) == 0 ? name + length : NULL;
 }
 
-/// HOST:PORT, [V6]:PORT or PORT alone into its parts; false if there is no port.
-static bool split_address(const char *text, char *out_host, size_t size, const char **out_port)
+/// The resolver takes 70000 for 4464.
+static bool is_port(const char *text, long lowest)
+{
+    const size_t digits_max = 5, digits = strspn(text, "0123456789");
+    long number = digits > 0 && digits <= digits_max && text[digits] == '\0' ? strtol(text, NULL, 10) : -1;
+    return number >= lowest && number <= 65535;
+}
+
+/// HOST:PORT, [V6]:PORT or PORT alone into its parts; false if there is no port, or none from `port_lowest` to 65535.
+static bool split_address(const char *text, long port_lowest, char *out_host, size_t size, const char **out_port)
 {
     const char *colon = strrchr(text, ':');
     const char *end = colon ? colon : text;
     *out_port = colon ? colon + 1 : text;
-    if (**out_port == '\0' || strspn(*out_port, "0123456789") != strlen(*out_port)) {
+    if (!is_port(*out_port, port_lowest)) {
         return false;
     }
     const bool bracketed = colon && text[0] == '[' && colon > text && colon[-1] == ']';
@@ -37,16 +46,18 @@ static int open_slcan(struct can_bus *self, const char *address, const char *opt
     char host[128], reason[300] = "";
     const char *port;
     bool done;
+    const long port_lowest = serves ? 0 : 1; // 0: a free one
     self->is_slcan = true;
     if (address[0] == '/') {
         done = serves ? slcan_listen_pty(&self->slcan, address, reason, sizeof reason)
                       : slcan_connect_serial(&self->slcan, address, bitrate, reason, sizeof reason);
-    } else if (split_address(address, host, sizeof host, &port)) {
+    } else if (split_address(address, port_lowest, host, sizeof host, &port)) {
         done = serves ? slcan_listen_tcp(&self->slcan, host, port, reason, sizeof reason)
                       : slcan_connect_tcp(&self->slcan, host, port, bitrate, reason, sizeof reason);
     } else {
         return error_set(out_error, error_usage,
-                         "%s: 'slcan:%s', expected slcan:HOST:PORT or slcan:/PATH of a serial device", option, address);
+                         "%s: 'slcan:%s', expected slcan:HOST:PORT (port %ld..65535) or slcan:/PATH of a serial device", option,
+                         address, port_lowest);
     }
     return done ? 0 : error_set(out_error, error_refused, "%s: slcan:%s", option, reason);
 }

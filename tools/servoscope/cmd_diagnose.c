@@ -321,17 +321,25 @@ const struct command command_cmd_diagnose = {
             "  --report R.html      one page with figures\n"
             "  --extended M.json    the model with the causes, for servoscope simulate and measure --drive sim:M.json\n"
             "  --map NAME=COLUMN[*SCALE],...  --rate HZ    for recordings of others; hold for every run named\n"
+            "                       NAME is torque_Nm, torque_ref_Nm, position_rad, velocity_rad_per_s, force_N,\n"
+            "                       position_m, velocity_m_per_s, current_A, current_ref_A (all: docs/files.md)\n"
+            "                       values are taken times SCALE, whatever unit COLUMN names:\n"
+            "                       position_rad=angle_deg*0.0174532925\n"
+            "                       semicolons, tabs, decimal commas, MATLAB: servoscope convert first\n"
             "\n"
             "A cause is named only if the data cannot do without it; what has no name stays \"unexplained\". Error is "
             "the RMS of the\n"
             "torque that the model misplaces for the measured motion, over the RMS of the measured torque. Evidence is "
             "a\n"
-            "log-likelihood ratio in nats. The exit status is 0 whatever the verdict is. Ctrl-C ends the search and "
+            "log-likelihood ratio in nats. \"Over expected\" weighs the error by its noise: 1 is a perfect model.\n"
+            "The exit status is 0 whatever the verdict is. Ctrl-C ends the search and "
             "reports the\n"
             "best so far, with exit status 1.\n"
             "\n"
             "example:\n"
             "  servoscope diagnose run1.csv --validate run2.csv --model nominal.json --report r.html --extended "
-            "extended.json\n",
+            "extended.json\n"
+            "a log with a current and an encoder of 8192 counts a turn:\n"
+            "  servoscope diagnose log.csv --rate 1000 --map torque_Nm=iq*0.71,position_rad=counts*0.000766990394\n",
     .run = run,
 };

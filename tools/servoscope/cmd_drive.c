@@ -72,7 +72,7 @@ static const struct scheme *choose(const char *const names[scheme_count], const 
         }
     }
     if (!chosen) {
-        error_set(out_error, error_usage, "--can or --modbus is missing: which bus the drive is on");
+        error_set(out_error, error_usage, "--can, --modbus or --odrive is missing: which bus the drive is on");
     }
     return chosen;
 }

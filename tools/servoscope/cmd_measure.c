@@ -65,6 +65,11 @@ static int run(int argc, char **argv, const struct command_context *context, str
     measuring_defaults(&arguments.measuring);
     int status = read_options(argc, argv, &arguments, out_error);
     if (!status && modbus_measuring_is(arguments.drive)) {
+        if (arguments.measuring.report) {
+            return error_set(out_error, error_usage,
+                             "--report: a drive on Modbus sends its response, not the samples that the page is made "
+                             "of: expected a drive on another bus");
+        }
         return modbus_measuring_run(&arguments.measuring, arguments.drive, context, out_error);
     }
     arguments.measuring.drive_file = status ? NULL : model_path(arguments.drive);

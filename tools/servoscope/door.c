@@ -24,13 +24,9 @@ int door_open(const char *url, const struct sim_model *model, struct door *out_d
             out_door->scheme = scheme;
             return status;
         }
-        snprintf(&forms[used], sizeof forms - used, "%s%s",
-                 i == 0                 ? ""
-                 : i + 1 < scheme_count ? ", "
-                                        : " or ",
-                 scheme->form);
+        snprintf(&forms[used], sizeof forms - used, "%s%s", i == 0 ? "" : ", ", scheme->form);
     }
-    return error_set(out_error, error_usage, "--drive: '%s' is no drive that this program can reach; expected %s", url,
+    return error_set(out_error, error_usage, "--drive: '%s' is no drive that this program can reach; expected %s%s", url,
                      forms);
 }
 

@@ -35,7 +35,8 @@ enum can_status driving_serve(const struct can_port *port, const struct can_part
     const struct can_port_operations *bus = port->operations;
     enum can_status status = can_ok;
     uint64_t now_us = bus->time_us(port->self);
-    const uint64_t end_us = for_s > 0.0 ? now_us + (uint64_t)(for_s * 1e6) : CAN_NEVER_US;
+    const double endless_s = 1e12; // in microseconds it still is a number of the bus's clock
+    const uint64_t end_us = for_s > 0.0 && for_s < endless_s ? now_us + (uint64_t)(for_s * 1e6) : CAN_NEVER_US;
     while (status != can_err_gone && now_us < end_us && !*interrupt_flag()) {
         uint64_t due_us = earlier(drive->deadline_us(drive->self), earlier(end_us, now_us + longest_wait_us));
         if (due_us > now_us) {
@@ -150,6 +151,7 @@ static int run_drive(struct driving *self, const struct driving_request *request
     driving_say_start(&self->bus, request, name, context);
     enum can_status ended = driving_serve(&port, &participant, request->for_s);
     real_time_leave(&self->rights);
+    can_bus_close(&self->bus); // also where nobody reads what is said now
     interrupt_release(&signals);
     int status = say_end(self, context, out_error);
     if (!status && ended == can_err_gone) {

@@ -4,6 +4,7 @@
 #include "drivers/modbus/host.h"
 #include "lab/record/json_out.h"
 #include "ports/modbus_server.h"
+#include "ports/place.h"
 #include "sim/node/modbus_drive.h"
 #include "tools/servoscope/interrupt.h"
 
@@ -39,14 +40,18 @@ static void step_until(struct modbus_drive *drive, double now, double *io_sample
 static int open_server(const struct driving_request *request, const char *name, struct modbus_drive *drive,
                        struct modbus_server *out_server, struct error *out_error)
 {
-    char text[200];
+    char text[200], where[128];
     bool opened;
-    if (strncmp(name, "tcp:", 4) == 0) {
+    long number;
+    const bool tcp = strncmp(name, "tcp:", 4) == 0, rtu = strncmp(name, "rtu:", 4) == 0;
+    if ((!tcp && !rtu) || !place_split(name + 4, where, sizeof where, &number) || (tcp && number > 65535)) {
+        return error_set(out_error, error_usage,
+                         "--modbus: '%s': expected tcp:HOST:PORT (port 0..65535) or rtu:DEVICE:BAUD", name);
+    }
+    if (tcp) {
         opened = modbus_server_open_tcp(out_server, &drive->map, name + 4, text, sizeof text);
-    } else if (strncmp(name, "rtu:", 4) == 0) {
-        opened = modbus_server_open_rtu(out_server, &drive->map, name + 4, (uint8_t)request->node, text, sizeof text);
     } else {
-        return error_set(out_error, error_usage, "--modbus: '%s': expected tcp:HOST:PORT or rtu:DEVICE:BAUD", name);
+        opened = modbus_server_open_rtu(out_server, &drive->map, name + 4, (uint8_t)request->node, text, sizeof text);
     }
     return opened ? 0 : error_set(out_error, error_refused, "--modbus: %s", text);
 }
@@ -82,6 +87,12 @@ int driving_modbus(const struct driving_request *request, const char *name, stru
     if (request->faults) {
         return error_set(out_error, error_usage, "--faults: '%s': faults are those of a CAN bus, expected --can",
                          request->faults);
+    }
+    if (request->latch_us > 0.0 || request->reply_us > 0.0 || request->drift_ppm != 0.0 ||
+        request->period_tolerance > 0.0) {
+        return error_set(out_error, error_usage,
+                         "--modbus: --latch-delay, --reply-delay, --clock-drift and --period-tolerance are those of a "
+                         "drive on CAN, expected --can");
     }
     struct modbus_drive *drive = malloc(sizeof *drive);
     if (!drive || modbus_drive_init(drive, model) != core_ok) {

@@ -44,6 +44,10 @@ static int run_node(struct odriving *self, const struct driving_request *request
 int driving_odrive(const struct driving_request *request, const char *name, struct sim_model *model,
                    const struct command_context *context, struct error *out_error)
 {
+    if (request->latch_us > 0.0 || request->reply_us > 0.0 || request->period_tolerance > 0.0) {
+        return error_set(out_error, error_usage,
+                         "--odrive: it has no SYNC, and so no --latch-delay, --reply-delay and --period-tolerance");
+    }
     if (request->node > odrive_node_max || request->faults || context->json) {
         return error_set(out_error, error_usage, "--odrive: expected --node 1..%d, without --faults and --json",
                          odrive_node_max);

@@ -27,12 +27,18 @@ void interrupt_catch(struct interrupt *out_self, bool second_ends)
     stop_requested = 0;
     sigaction(SIGINT, &action, &out_self->interrupt_before);
     sigaction(SIGTERM, &action, &out_self->terminate_before);
+    // A terminal that is closed under a moving axis. Who asked for that to be ignored (nohup) is not disturbed.
+    sigaction(SIGHUP, NULL, &out_self->hang_up_before);
+    if (out_self->hang_up_before.sa_handler != SIG_IGN) {
+        sigaction(SIGHUP, &action, NULL);
+    }
 }
 
 void interrupt_release(const struct interrupt *self)
 {
     sigaction(SIGINT, &self->interrupt_before, NULL);
     sigaction(SIGTERM, &self->terminate_before, NULL);
+    sigaction(SIGHUP, &self->hang_up_before, NULL);
 }
 
 const volatile sig_atomic_t *interrupt_flag(void)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/// Ctrl-C and a polite kill as a request that a loop can ask for, and a line on the terminal while it works.
+/// Ctrl-C, a polite kill and a closed terminal as a request that a loop can ask for, and a line on the terminal while it works.
 #ifndef SERVOSCOPE_TOOLS_INTERRUPT_H
 #define SERVOSCOPE_TOOLS_INTERRUPT_H
 
@@ -12,9 +12,10 @@
 struct interrupt {
     struct sigaction interrupt_before;
     struct sigaction terminate_before;
+    struct sigaction hang_up_before;
 };
 
-/// From here on SIGINT and SIGTERM set the flag that interrupt_flag() names, instead of ending the program.
+/// From here on SIGINT, SIGTERM and SIGHUP set the flag that interrupt_flag() names, instead of ending the program.
 /// `second_ends`: the second signal ends it after all, for work that moves nothing.
 void interrupt_catch(struct interrupt *out_self, bool second_ends);
 

@@ -5,23 +5,12 @@
 #include "lab/record/manifest.h"
 #include "tools/servoscope/interrupt.h"
 #include "tools/servoscope/measured.h"
+#include "tools/servoscope/measured_page.h"
+#include "tools/servoscope/measuring_live.h"
 #include "tools/servoscope/measuring_sequence.h"
 #include "tools/servoscope/outputs.h"
 
-#include <stdio.h>
 #include <string.h>
-
-/// One line on the terminal; the clock is not asked at every sample.
-static void show_progress(void *object, size_t done, size_t total)
-{
-    struct terminal_line *line = object;
-    if (done % 64 != 0 || !terminal_line_due(line)) {
-        return;
-    }
-    double rate = (double)done / terminal_line_elapsed_s(line);
-    fprintf(stderr, "\r%5.1f %%  %.0f samples/s  %.0f s left   ", 100.0 * (double)done / (double)total, rate,
-            (double)(total - done) / rate);
-}
 
 void measuring_defaults(struct measuring_request *out_request)
 {
@@ -33,6 +22,7 @@ size_t measuring_options(struct measuring_request *request, struct option *out_o
     const struct option options[] = {
         {.name = "table", .kind = option_text, .target = &request->table, .required = true},
         {.name = "out", .kind = option_text, .target = &request->out, .required = true},
+        {.name = "report", .kind = option_text, .target = &request->report},
         {.name = "mode", .kind = option_text, .target = &request->mode},
         {.name = "periods",
          .kind = option_integer,
@@ -92,8 +82,8 @@ int measuring_prepare(const struct measuring_request *request, struct measuring 
     *out_self = (struct measuring){.request = request};
     struct measure_plan *plan = &out_self->plan;
     int status = read_mode(request->mode, &plan->mode, out_error);
-    const char *inputs[] = {request->table, request->drive_file};
-    status = status ? status : outputs_check(inputs, 2, &request->out, 1, out_error);
+    const char *inputs[] = {request->table, request->drive_file}, *outputs[] = {request->out, request->report};
+    status = status ? status : outputs_check(inputs, 2, outputs, 2, out_error);
     if (status) {
         return status;
     }
@@ -141,21 +131,23 @@ int measuring_run(struct measuring *self, const struct drive *drive, const char 
     if (self->sequence.segment_count > 0) {
         return measuring_sequence_run(self, drive, source, context, out_error);
     }
-    struct terminal_line line;
+    struct measuring_live live;
     struct interrupt signals;
     struct measure_report report;
     struct run run;
-    terminal_line_start(&line, context);
-    self->plan.progress = show_progress;
-    self->plan.progress_context = &line;
+    const double started_s = measuring_live_now_s();
+    measuring_live_start(&live, context, started_s, NULL, &self->plan);
     interrupt_catch(&signals, false);
     int status = measure_run(drive, &self->plan, &run, &report, out_error);
-    double rate_per_s = (double)report.rows / (terminal_line_elapsed_s(&line) + 1e-9);
-    terminal_line_clear(&line);
+    double rate_per_s = (double)report.rows / (measuring_live_now_s() - started_s + 1e-9);
+    measuring_live_stop(&live);
     if (run.rows > 0) {
         const struct measured measured = {self->request->out, source, &run, &report, rate_per_s, self->door};
         struct error reason = {0, ""};
         int written = measured_keep(&measured, &reason);
+        if (!written && self->request->report) {
+            written = measured_page_write(self->request->report, &measured, &self->plan, &reason);
+        }
         written = written ? written : report_run(&measured, context, &reason);
         if (written) {
             status = error_set(out_error, written, "%s", reason.message);

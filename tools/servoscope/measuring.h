@@ -19,6 +19,7 @@ enum { measuring_options_max = 16 };
 struct measuring_request {
     const char *table; ///< a table, or the manifest of a sequence of them
     const char *out;
+    const char *report;     ///< a page beside the run; NULL: none
     const char *drive_file; ///< the model file that is the drive, not to be overwritten; NULL: there is none
     const char *mode;
     long long periods;
@@ -52,7 +53,7 @@ size_t measuring_options(struct measuring_request *request, struct option *out_o
 int measuring_prepare(const struct measuring_request *request, struct measuring *out_self, struct error *out_error);
 
 /// Measures through an unopened drive, writes the run file (also what was kept of a measurement that ended early), or
-/// the runs of a sequence and their manifest, prints progress and summary. `source` names the drive in the run (key
+/// the runs of a sequence and their manifest, and the page; shows progress, prints a summary. `source` names the drive in the run (key
 /// `drive`). Ctrl-C ramps down while this runs.
 /// Errors: error_refused if the measurement is not complete or not written
 int measuring_run(struct measuring *self, const struct drive *drive, const char *source,
@@ -81,6 +82,8 @@ void measuring_free(struct measuring *self);
     "                       torque is refused (a linear table: m, m/s, N); the torque limit is set in the drive too\n" \
     "                       (default there: 3 times the table's largest torque)\n"                                     \
     "  --out RUN.csv        the recording; of a sequence RUN-1.csv, RUN-2.csv ... and RUN.csv, which names them for "  \
-    "frf\n"
+    "frf\n"                                                                                                            \
+    "  --report FILE.html   a page: bus timing, lost and late samples, level against table and limits, settling, "     \
+    "lines\n"
 
 #endif

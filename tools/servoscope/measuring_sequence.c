@@ -6,6 +6,8 @@
 #include "lab/record/run_sequence.h"
 #include "tools/servoscope/interrupt.h"
 #include "tools/servoscope/measured.h"
+#include "tools/servoscope/measured_page.h"
+#include "tools/servoscope/measuring_live.h"
 #include "tools/servoscope/outputs.h"
 
 #include <math.h>
@@ -114,7 +116,7 @@ static int check_outputs(const struct measuring *self, struct error *out_error)
         return error_set(out_error, error_usage, "--out: '%s' is no ordinary file: a sequence writes several beside it",
                          request->out);
     }
-    const size_t input_count = sequence->segment_count + 3;
+    const size_t input_count = sequence->segment_count + 4;
     const char **inputs = calloc(input_count, sizeof *inputs);
     char **tables = calloc(sequence->segment_count, sizeof *tables);
     int status = inputs && tables ? 0 : refuse_memory(sequence->path, out_error);
@@ -123,6 +125,7 @@ static int check_outputs(const struct measuring *self, struct error *out_error)
         status = tables[i] ? 0 : refuse_memory(sequence->path, out_error);
     }
     for (size_t i = 0; !status && i < sequence->segment_count; i++) {
+        inputs[input_count - 4] = request->report;
         inputs[input_count - 3] = request->table;
         inputs[input_count - 2] = request->drive_file;
         inputs[input_count - 1] = request->out;
@@ -180,7 +183,7 @@ struct playing {
     const struct drive *drive;
     const char *source;
     const struct command_context *context;
-    struct terminal_line line;
+    double started_s;
     size_t samples_before; ///< played in earlier segments
     size_t samples_planned;
     double position_rad; ///< where the axis stands, from where it stood at first
@@ -188,22 +191,11 @@ struct playing {
     struct measure_report report; ///< of the last segment
     size_t rows;
     size_t rows_lost;
-    cJSON *said; ///< array: what --json says of each segment
+    cJSON *said;     ///< array: what --json says of each segment
+    struct run keys; ///< the last run's keys, without its columns, for the page
+    size_t page_count;
+    struct measure_page_segment *page_segments; ///< NULL: no page is wanted
 };
-
-static void show_progress(void *object, size_t done, size_t total)
-{
-    struct playing *self = object;
-    (void)total;
-    if (done % 64 != 0 || !terminal_line_due(&self->line)) {
-        return;
-    }
-    const double samples = (double)(self->samples_before + done);
-    const double planned = fmax((double)self->samples_planned, samples);
-    const double rate = samples / terminal_line_elapsed_s(&self->line);
-    fprintf(stderr, "\r%5.1f %%  %.0f samples/s  %.0f s left   ", 100.0 * samples / planned, rate,
-            (planned - samples) / rate);
-}
 
 /// The guard counts from where the axis stands now, the person from where it stood at first.
 static void shift_limits(struct measure_plan *plan, double position_rad)
@@ -247,13 +239,85 @@ static int keep_segment(struct playing *self, size_t segment, struct run *run, d
         self->rows_lost += self->report.rows_lost;
         cJSON_AddItemToArray(self->said, measured_json(&measured));
         if (!self->context->json && !self->context->quiet) {
-            terminal_line_clear(&self->line);
             measured_print(&measured);
         }
         status = entry->run ? 0 : refuse_memory(path, out_error);
     }
     free(path);
     return status;
+}
+
+static int refuse_page(const struct playing *self, struct error *out_error)
+{
+    return refuse_memory(self->measuring->request->report, out_error);
+}
+
+/// The bus's keys count on from segment to segment: the last ones are those of the whole.
+static bool keep_keys(struct playing *self, const struct run *run)
+{
+    run_free(&self->keys);
+    self->keys.sample_rate_hz = run->sample_rate_hz;
+    bool kept = true;
+    for (size_t i = 0; i < run->key_count && kept; i++) {
+        kept = run_set_key(&self->keys, run->keys[i].key, run->keys[i].value);
+    }
+    return kept;
+}
+
+/// What the page needs of a segment, whose run does not stay in memory.
+static int keep_for_page(struct playing *self, size_t segment, const struct run *run, const struct measure_plan *plan,
+                         struct error *out_error)
+{
+    struct measure_summary summary;
+    if (!self->page_segments) {
+        return 0;
+    }
+    if (!keep_keys(self, run) ||
+        !measure_summary_make(run, plan->table, &plan->limits, self->report.rows_planned, &summary)) {
+        return refuse_page(self, out_error);
+    }
+    struct measure_page_segment *kept = &self->page_segments[self->page_count];
+    const bool made = measure_page_segment_make(&summary, &self->report, kept);
+    measure_summary_free(&summary);
+    if (!made) {
+        return refuse_page(self, out_error);
+    }
+    kept->name = self->runs.segments[segment].run;
+    self->page_count++;
+    return 0;
+}
+
+static int write_page(struct playing *self, const struct error *stopped, struct error *out_error)
+{
+    const struct measuring_request *request = self->measuring->request;
+    const struct measure_page_sequence sequence = {
+        .kind = self->runs.kind,
+        .planned = self->runs.segment_count,
+        .stopped_by = stopped->status ? stopped->message : NULL,
+        .keys = &self->keys,
+        .count = self->page_count,
+        .segments = self->page_segments,
+        .linear = self->measuring->linear,
+    };
+    return measured_page_write_sequence(request->report, request->out, self->source, &sequence, out_error);
+}
+
+static int prepare_page(struct playing *self, struct error *out_error)
+{
+    if (self->measuring->request->report) {
+        self->page_segments = calloc(self->runs.segment_count, sizeof *self->page_segments);
+        return self->page_segments ? 0 : refuse_page(self, out_error);
+    }
+    return 0;
+}
+
+static void free_page(struct playing *self)
+{
+    for (size_t i = 0; i < self->page_count; i++) {
+        measure_page_segment_free(&self->page_segments[i]);
+    }
+    free(self->page_segments);
+    run_free(&self->keys);
 }
 
 static int play_segment(struct playing *self, size_t segment, struct error *out_error)
@@ -265,17 +329,21 @@ static int play_segment(struct playing *self, size_t segment, struct error *out_
     if (status) {
         return status;
     }
-    plan.progress = show_progress;
-    plan.progress_context = self;
+    struct measuring_live live;
+    const struct measuring_live_place place = {segment + 1, self->runs.segment_count, self->samples_before,
+                                               self->samples_planned};
     shift_limits(&plan, self->position_rad);
-    const double begun_s = terminal_line_elapsed_s(&self->line);
+    measuring_live_start(&live, self->context, self->started_s, &place, &plan);
+    const double begun_s = measuring_live_now_s();
     status = measure_run(self->drive, &plan, &run, &self->report, out_error);
-    const double took_s = terminal_line_elapsed_s(&self->line) - begun_s + 1e-9;
+    const double took_s = measuring_live_now_s() - begun_s + 1e-9;
+    measuring_live_stop(&live);
     self->position_rad += self->report.end_position_rad;
     self->samples_before += self->report.rows_planned;
     if (run.rows > 0) {
         struct error reason = {0, ""};
         int written = keep_segment(self, segment, &run, (double)self->report.rows / took_s, &reason);
+        written = written ? written : keep_for_page(self, segment, &run, &plan, &reason);
         status = written ? error_set(out_error, written, "%s", reason.message) : status;
     }
     run_free(&run);
@@ -339,7 +407,7 @@ static int print_json(struct playing *self, struct error *out_error)
     cJSON_AddNumberToObject(object, "rows", (double)self->rows);
     cJSON_AddNumberToObject(object, "rows_planned", (double)self->samples_planned);
     cJSON_AddNumberToObject(object, "samples_lost", (double)self->rows_lost);
-    cJSON_AddNumberToObject(object, "samples_per_s", (double)self->rows / terminal_line_elapsed_s(&self->line));
+    cJSON_AddNumberToObject(object, "samples_per_s", (double)self->rows / (measuring_live_now_s() - self->started_s));
     if (self->measuring->door) {
         measured_add_bus(self->measuring->door, object);
     }
@@ -378,6 +446,9 @@ static int finish(struct playing *self, int status, struct error *io_error)
         return status;
     }
     int written = write_manifest(self, &stopped, &reason);
+    if (!written && self->page_segments) {
+        written = write_page(self, &stopped, &reason);
+    }
     if (!written && self->context->json) {
         written = print_json(self, &reason);
     } else if (!written && !self->context->quiet) {
@@ -391,18 +462,19 @@ int measuring_sequence_run(struct measuring *self, const struct drive *drive, co
 {
     struct playing playing = {.measuring = self, .drive = drive, .source = source, .context = context};
     struct interrupt signals;
-    terminal_line_start(&playing.line, context);
+    playing.started_s = measuring_live_now_s();
     playing.said = cJSON_CreateArray();
     int status = plan_runs(&playing, out_error);
+    status = status ? status : prepare_page(&playing, out_error);
     interrupt_catch(&signals, false);
     if (!status) {
         struct error reason = {0, ""};
         status = play_segments(&playing, &reason);
-        terminal_line_clear(&playing.line);
         status = finish(&playing, status, &reason);
         status = status ? error_set(out_error, status, "%s", reason.message) : 0;
     }
     interrupt_release(&signals);
+    free_page(&playing);
     run_sequence_free(&playing.runs);
     cJSON_Delete(playing.said);
     return status;

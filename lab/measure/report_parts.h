@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT */
+/// What the pages of a run and of a sequence have in common. Internal to lab/measure/report*.
+#ifndef SERVOSCOPE_MEASURE_REPORT_PARTS_H
+#define SERVOSCOPE_MEASURE_REPORT_PARTS_H
+
+#include "lab/measure/report.h"
+
+/// Names and units of the quantities of a kind of axis.
+struct report_words {
+    const char *name[measure_quantities];
+    const char *unit[measure_quantities];
+};
+
+const struct report_words *report_words_of(bool linear);
+
+/// A run's key as a number; NaN if it is not there.
+double report_key_number(const struct run *run, const char *key);
+
+/// A note about the worst SYNC, if the run has one; `rate_hz` of the SYNC.
+void report_add_bus_note(struct page *page, const struct run *run);
+
+/// The section on bus timing.
+void report_add_bus(struct page *page, const struct run *run);
+
+/// The section on amplitudes: `averaged` periods each; 0: not said.
+void report_add_spectrum(struct page *page, bool linear, size_t count, const double *frequency_hz,
+                         double *const amplitude[], double *const table_amplitude[], const char *what);
+
+#endif
