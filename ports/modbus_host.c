@@ -173,8 +173,7 @@ static struct modbus_port *finish_open(struct modbus_port *self, const char *pla
     // Recovery is ours (settle): the library's may repeat a request or wait without end.
     modbus_set_error_recovery(self->context, MODBUS_ERROR_RECOVERY_NONE);
     if (modbus_connect(self->context) == -1) {
-        return fail(self, out_text, text_size, place,
-                    errno == ENOTTY ? "is no serial device" : modbus_strerror(errno));
+        return fail(self, out_text, text_size, place, errno == ENOTTY ? "is no serial device" : modbus_strerror(errno));
     }
     if (!self->tcp) {
         modbus_flush(self->context);

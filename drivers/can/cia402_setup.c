@@ -336,16 +336,23 @@ static enum drive_status write_sync(struct cia402_master *self)
     return status == drive_ok ? write_all(self, &period, 1) : status;
 }
 
+/// Three heartbeats, or as long as SYNC is waited for: a machine that may be late with one may be so with the other.
+static uint32_t heartbeat_lost_after_ms(const struct cia402_master *self)
+{
+    const uint32_t three_ms = 3u * self->options.heartbeat_ms, sync_ms = self->options.sync_timeout_us / 1000u;
+    return sync_ms > three_ms ? sync_ms : three_ms;
+}
+
 static enum drive_status write_parameters(struct cia402_master *self, struct parameter units, struct parameter exponent)
 {
-    const uint32_t heartbeat_ms = self->options.heartbeat_ms;
+    const uint32_t heartbeat_ms = self->options.heartbeat_ms, lost_after_ms = heartbeat_lost_after_ms(self);
     const uint32_t mode = self->configuration.mode == drive_mode_torque ? cia402_mode_cst : cia402_mode_csp;
     const struct parameter parameters[] = {
         {cia402_quick_stop_option, 0, 2, 2}, // ramp, then without torque: how stop() ends
         {cia402_modes_of_operation, 0, 1, mode},
         exponent,
         units,
-        {0x1016, 1, 4, (uint32_t)self->options.master_id << 16 | heartbeat_ms * 3},
+        {0x1016, 1, 4, (uint32_t)self->options.master_id << 16 | lost_after_ms},
         {0x1017, 0, 2, heartbeat_ms},
     };
     enum drive_status status = write_all(self, parameters, sizeof parameters / sizeof parameters[0]);
@@ -446,7 +453,7 @@ static enum drive_status start_node(struct cia402_master *self)
     struct canopen_master *bus = &self->bus;
     const uint32_t heartbeat_us = self->options.heartbeat_ms * 1000u;
     heartbeat_producer_start(&bus->producer, self->options.master_id, heartbeat_us, canopen_master_time_us(bus));
-    heartbeat_consumer_start(&bus->consumer, self->options.node_id, heartbeat_us * 3);
+    heartbeat_consumer_start(&bus->consumer, self->options.node_id, 1000u * heartbeat_lost_after_ms(self));
     for (int attempt = 0; attempt < 3; attempt++) {
         struct can_frame frame = nmt_command_frame(nmt_start, self->options.node_id);
         canopen_master_send(bus, &frame);

@@ -310,7 +310,7 @@ static enum modbus_host_status send_chunk(struct modbus_host *self, const uint8_
 }
 
 static enum modbus_host_status send_table(struct modbus_host *self, const uint8_t *table, uint32_t bytes,
-                                          void (*progress)(void *context, size_t done, size_t total), void *context)
+                                          bool (*progress)(void *context, size_t done, size_t total), void *context)
 {
     uint32_t total = bytes / 2u;
     uint32_t most = self->identity.chunk_words < modbus_chunk_words ? self->identity.chunk_words : modbus_chunk_words;
@@ -321,8 +321,9 @@ static enum modbus_host_status send_table(struct modbus_host *self, const uint8_
             return status;
         }
         done += count;
-        if (progress) {
-            progress(context, done, total);
+        if (progress && !progress(context, done, total)) {
+            snprintf(self->detail, sizeof self->detail, "ended while the table was sent");
+            return modbus_host_ended;
         }
     }
     return modbus_host_ok;
@@ -330,7 +331,7 @@ static enum modbus_host_status send_table(struct modbus_host *self, const uint8_
 
 enum modbus_host_status modbus_host_upload(struct modbus_host *self, const uint8_t *table,
                                            const struct modbus_host_setup *setup,
-                                           void (*progress)(void *context, size_t done, size_t total), void *context)
+                                           bool (*progress)(void *context, size_t done, size_t total), void *context)
 {
     if (setup->table_bytes > self->identity.table_bytes_max || setup->table_bytes % 2u != 0 ||
         self->identity.chunk_words == 0) {
@@ -425,6 +426,8 @@ const char *modbus_host_status_str(enum modbus_host_status status)
         return "not a drive with servoscope's register map";
     case modbus_host_argument:
         return "more than the drive holds";
+    case modbus_host_ended:
+        return "ended by the caller";
     }
     return "unknown status";
 }

@@ -28,6 +28,7 @@ enum modbus_host_status {
     modbus_host_refused = -3,  ///< the drive answers with an exception or a result; `detail` says which
     modbus_host_identity = -4, ///< what answers is not a drive with this map
     modbus_host_argument = -5, ///< a table or setup that the drive says it cannot hold
+    modbus_host_ended = -6,    ///< the caller wanted no more
 };
 
 struct modbus_host_identity {
@@ -80,10 +81,10 @@ enum modbus_host_status modbus_host_command(struct modbus_host *self, enum modbu
 enum modbus_host_status modbus_host_write_setup(struct modbus_host *self, const struct modbus_host_setup *setup);
 
 /// Opens an upload, sends all bytes of a table (an even number), with its setup, and has the drive verify it.
-/// progress: called after each chunk; NULL: nobody looks
+/// progress: called after each chunk, false ends the upload (modbus_host_ended); NULL: nobody looks
 enum modbus_host_status modbus_host_upload(struct modbus_host *self, const uint8_t *table,
                                            const struct modbus_host_setup *setup,
-                                           void (*progress)(void *context, size_t done, size_t total), void *context);
+                                           bool (*progress)(void *context, size_t done, size_t total), void *context);
 
 /// A snapshot of one period (from 0) or of MODBUS_MEAN.
 struct modbus_host_spectrum {

@@ -3,7 +3,9 @@
 
 #include "lab/diagnose/blackbox.h"
 #include "lab/diagnose/gain.h"
+#include "lab/diagnose/hidden_mass.h"
 #include "lab/diagnose/hold.h"
+#include "lab/diagnose/inertia_guess.h"
 #include "lab/diagnose/judge.h"
 #include "lab/diagnose/recording.h"
 #include "lab/diagnose/repeat.h"
@@ -144,58 +146,11 @@ static int prepare_recordings(const struct diagnosis_request *request, struct wo
     return 0;
 }
 
-/// Torque against acceleration: Newton's law over stretches of a quarter of the excitation's middle period, in which
-/// the noise of a speed matters less than from sample to sample.
-struct inertia_guess {
-    double inertia;     ///< of a rigid body by least squares; negative: positive torque accelerates backward
-    double correlation; ///< -1..1
-    double least;       ///< correlation below which nothing accelerates: more of it is chance at constant speed
-    double negligible;  ///< an inertia that takes a hundredth of the torque for the accelerations there are
-};
-
-static struct inertia_guess guess_inertia(const struct recording *r)
-{
-    const struct stretch *b = &r->block;
-    const double little = 0.01;
-    size_t reach = b->samples / (8 * r->bins[r->bin_count / 2]);
-    reach = reach < 1 ? 1 : reach;
-    double ta = 0.0, aa = 0.0, tt = 0.0, mean = 0.0, sum = 0.0;
-    for (size_t n = 0; n < b->samples; n++)
-        mean += b->torque[n] / (double)b->samples;
-    for (size_t n = 0; n < b->samples; n++) {
-        sum += b->torque[n] - mean;
-        if (n < 2 * reach)
-            continue;
-        double change = b->velocity[n] - b->velocity[n - 2 * reach], a = change * r->rate_hz / (2.0 * (double)reach);
-        double t = (sum - 0.5 * (b->torque[n] + b->torque[n - 2 * reach]) + mean) / (2.0 * (double)reach);
-        ta += a * t;
-        aa += a * a;
-        tt += t * t;
-        sum -= b->torque[n - 2 * reach] - mean;
-    }
-    // Where nothing accelerates at all, as in a table of places, a speed that were lost in a sample stands in for it.
-    double still = 1e-6 * r->coverage.velocity_rms * r->rate_hz, any = sqrt(aa * tt);
-    double acceleration = fmax(sqrt(aa / (double)b->samples), fmax(still, 1e-12));
-    const double constant = 0.95, of_turn = 0.1, of_stroke = 0.02; // friction may take nearly all of a stroke's torque
-    return (struct inertia_guess){.inertia = aa > 0.0 ? ta / aa : 0.0,
-                                  .least = r->coverage.steadiness > constant ? of_turn : of_stroke,
-                                  .correlation = any > 0.0 ? ta / any : 0.0,
-                                  .negligible = little * r->coverage.torque_rms / acceleration};
-}
-
-/// Whether the torque and the acceleration have anything in common. Where a controller holds a constant speed, or the
-/// axis was held at one place after the other, the motion says nothing of the inertia, and a free one would explain it
-/// by having none of the torque act.
-static bool accelerates(const struct inertia_guess *guess)
-{
-    return fabs(guess->correlation) > guess->least;
-}
-
 /// The inertia at which a fit of a free one begins, or one too small to matter, which stays.
 static double start_inertia(const struct recording *first, struct diagnosis *d)
 {
-    struct inertia_guess guess = guess_inertia(first);
-    d->inertia_seen = accelerates(&guess);
+    struct inertia_guess guess = inertia_guess_make(first);
+    d->inertia_seen = inertia_guess_accelerates(&guess);
     if (d->inertia_seen)
         return fabs(guess.inertia);
     oddities_add(&d->oddities,
@@ -276,7 +231,7 @@ static void scale_input(struct work *w, struct diagnosis *d, double factor)
 /// A current or a voltage may count the other way round than the motion; a torque may not.
 static void choose_sign(struct work *w, struct diagnosis *d, const struct inertia_guess *guess)
 {
-    if (!accelerates(guess) || guess->inertia > 0.0)
+    if (!inertia_guess_accelerates(guess) || guess->inertia > 0.0)
         return;
     scale_input(w, d, -1.0);
     oddities_add(&d->oddities, "Positive %s accelerates backward (correlation %.2g): its sign was turned.",
@@ -290,9 +245,9 @@ static void choose_gain(struct work *w, struct diagnosis *d)
     d->input_gain = 1.0;
     if (!d->input_unit)
         return;
-    struct inertia_guess guess = guess_inertia(&w->recordings[0]);
+    struct inertia_guess guess = inertia_guess_make(&w->recordings[0]);
     choose_sign(w, d, &guess);
-    if (d->model_given && accelerates(&guess))
+    if (d->model_given && inertia_guess_accelerates(&guess))
         scale_input(w, d, (d->given.motor_inertia_kgm2 + d->given.load_inertia_kgm2) / fabs(guess.inertia));
     else if (!d->model_given)
         oddities_add(&d->oddities,
@@ -455,12 +410,52 @@ static bool refit_given(struct work *w, struct diagnosis *d, struct hypothesis *
     return true;
 }
 
+/// The noise follows the fit: estimated once more for what else is taken from it.
+static bool fit_hidden_mass(struct work *w, struct hypothesis *h, struct sim_model *io_model)
+{
+    if (!hidden_mass_fit(&w->fit_data, w->evidence, &w->fit, h))
+        return false;
+    hypothesis_model(h, NULL, io_model);
+    return estimate_fit_noise(w, io_model);
+}
+
+static bool names_new_mass(const struct hypothesis *before, const struct hypothesis *h)
+{
+    for (int e = 0; sim_effects[e]; e++)
+        if (sim_effects[e]->attach && h->named[e] && !before->named[e])
+            return true;
+    return false;
+}
+
+/// One round of the search. The structure stays where it is meanwhile if the noise depends on it.
+static bool search_once(struct work *w, const struct search_options *options, struct hypothesis *h,
+                        struct sim_model *io_model)
+{
+    struct hypothesis before = *h, free;
+    bool concerned = hidden_mass_concerns(&w->fit_data, h);
+    if (concerned)
+        hidden_mass_hold(h, &free);
+    bool good = search_run(&w->fit_data, &w->recordings[0].coverage, options, h, &w->fit);
+    if (concerned)
+        hidden_mass_release(&free, h);
+    hypothesis_model(h, NULL, io_model);
+    if (!good || !names_new_mass(&before, h) || !hidden_mass_concerns(&w->fit_data, h))
+        return good;
+    if (!fit_hidden_mass(w, h, io_model))
+        return false;
+    hidden_mass_instead(&w->fit_data, w->evidence, &w->recordings[0].coverage, &before, w->fit.cost, &w->fit, h);
+    hypothesis_model(h, NULL, io_model);
+    return true;
+}
+
 /// Estimates the noise and fits with it until neither changes the other. A name that is new was fitted with the noise
 /// of a model without it; what that is off by is not worth another name.
 static bool settle_noise(struct work *w, struct hypothesis *h, struct sim_model *io_model)
 {
     enum { most = 4 };
     const double settled = 0.01; // of the residuals' number
+    if (hidden_mass_concerns(&w->fit_data, h))
+        return fit_hidden_mass(w, h, io_model);
     for (int pass = 0; pass < most; pass++) {
         if (!estimate_fit_noise(w, io_model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations))
             return false;
@@ -490,9 +485,8 @@ static bool find_causes(const struct diagnosis_request *request, struct work *w,
     for (size_t pass = 0; pass < 2 * options.causes_max; pass++) {
         struct hypothesis before = *h;
         if ((pass > 0 && !refine_gain(w, d, h, &step)) || !settle_noise(w, h, &model) ||
-            !search_run(&w->fit_data, &w->recordings[0].coverage, &options, h, &w->fit))
+            !search_once(w, &options, h, &model))
             return false;
-        hypothesis_model(h, NULL, &model);
         if (same_names(&before, h))
             break;
     }
@@ -500,6 +494,8 @@ static bool find_causes(const struct diagnosis_request *request, struct work *w,
     for (int pass = 0; contrast_concerns(&model) && pass < 2; pass++)
         if (!fit_anew(w, h, &model))
             return false;
+    if (hidden_mass_concerns(&w->fit_data, h) && !fit_hidden_mass(w, h, &model))
+        return false;
     d->extended_model = model;
     d->fit_misfit = w->fit.cost / (double)w->fit_data.values;
     return true;
@@ -715,7 +711,8 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     if (!judge_structure(&w->validate_data, &d->extended_model, &seen.over_time) ||
         !judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, &seen, &judgement))
         return false;
-    if (!repeat_compare(&w->fit_data, h, &w->fit, &w->validate_data, &w->repeat))
+    if (!repeat_compare(&w->fit_data, h, &w->fit, &w->validate_data, w->evidence + w->fit_count, &w->repeat) ||
+        !estimate_validation_noise(w, h, &d->extended_model)) // which that may have moved
         return false;
     bool distant = refuse_distance(w, d, &judgement);
     d->verdict = judgement.unexplained                                         ? diagnosis_unexplained

@@ -83,6 +83,9 @@ static double residual_at(const struct fit_data *data, const struct hypothesis *
 {
     struct sim_model model;
     hypothesis_model(h, x, &model);
+    for (size_t i = 0; data->renewed && i < data->runs; i++)
+        if (!evidence_renew_noise(&data->renewed[i], &model))
+            return INFINITY;
     *out_rows = fit_residual(data, &model, out_residual);
     double sum = sum_of_squares(data->values, out_residual) + contrast_cost(data, *out_rows, out_residual);
     return isfinite(sum) ? sum + prior_cost(h, x) : INFINITY;

@@ -15,6 +15,7 @@ struct fit_data {
     size_t values;                   ///< whitened residuals of all together
     size_t contrasts;         ///< what differs between periods, for hypotheses with an effect in time; contrast.h
     struct search_memo *memo; ///< fits that need not be repeated; NULL: none is remembered
+    struct evidence *renewed; ///< the evidence, where its noise is that of whatever model is tried; NULL: it stays
 };
 
 struct fit {

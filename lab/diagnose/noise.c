@@ -292,6 +292,26 @@ static double whitened_scatter(const struct evidence *self, const double *raw)
     return free_periods * (sum + (double)self->kinematics.values);
 }
 
+bool evidence_renew_noise(struct evidence *self, const struct sim_model *model)
+{
+    const struct recording *r = self->recording;
+    size_t bins = r->band + 1;
+    double *both = r->periodic ? residuals_of_all(self, model) : NULL;
+    double *spectra = malloc((r->periods + 1) * 4 * bins * sizeof *spectra), *raw = calloc(4 * bins, sizeof *raw);
+    bool good = both && spectra && raw;
+    if (good) {
+        scatter_of_periods(self, both, spectra, raw);
+        smooth(self, raw);
+        factorise(self);
+        self->scatter = whitened_scatter(self, raw);
+        make_allowances(self);
+    }
+    free(both);
+    free(spectra);
+    free(raw);
+    return good;
+}
+
 /// What the periods of a run have in common is its block, what they do not is noise or an effect that depends on time.
 static bool noise_from_periods(struct evidence *self, const struct sim_model *model, double *raw)
 {

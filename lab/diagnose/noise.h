@@ -46,6 +46,10 @@ void evidence_free(struct evidence *self);
 /// Errors: false if memory is short.
 bool evidence_estimate_noise(struct evidence *self, const struct sim_model *model);
 
+/// The whitening of a run with periods under a model, and nothing else that belongs to its noise: for fits in which the
+/// noise follows the model. Errors: false if memory is short, or without periods.
+bool evidence_renew_noise(struct evidence *self, const struct sim_model *model);
+
 /// In a run without periods: the noise from a whitened residual (by the present noise) out of which everything that a
 /// black box can explain has been taken. Nothing is done for periodic runs. Errors: false if memory is short.
 bool evidence_sharpen_noise(struct evidence *self, const double *whitened);

@@ -211,8 +211,8 @@ static double follow(const double *reference, const double *measured, size_t row
     return gain;
 }
 
-/// A torque that follows its reference closely, but by another factor than a drive's, has another unit or sign. One that
-/// saturates or lags so much that it is halved does not follow closely.
+/// A torque that follows its reference closely, but by another factor than a drive's, has another unit or sign. One
+/// that saturates or lags so much that it is halved does not follow closely.
 static int refuse_reference(const struct run *run, struct error *out_error)
 {
     const double closely = 0.95, most = 2.0;
@@ -409,6 +409,23 @@ static int refuse_inertia(const struct run *run, double inertia, double measured
                      path_of(run), measured, unit, measured / inertia, inertia, unit, means);
 }
 
+/// Both positive: nothing to say of what a model may be off by, a sentence of more, an error of what none is off by.
+static int compare_inertia(const struct run *run, double inertia, double measured, struct oddities *io,
+                           struct error *out_error)
+{
+    const double far = 3.0, absurd = 100.0;
+    double off = fmax(inertia / measured, measured / inertia);
+    const char *unit = run->linear ? "kg" : "kgm2";
+    if (off > absurd)
+        return refuse_inertia(run, inertia, measured, out_error);
+    if (off > far)
+        oddities_add(io,
+                     "%s: the torque over the acceleration makes %.3g %s, the model's %s is %.3g %s: a wrong unit, "
+                     "or a model of something else.",
+                     path_of(run), measured, unit, run->linear ? "mass" : "inertia", inertia, unit);
+    return 0;
+}
+
 int oddities_of_inertia(const struct run *run, const struct recording *recording, double inertia,
                         struct oddities *io_oddities, struct error *out_error)
 {
@@ -433,13 +450,5 @@ int oddities_of_inertia(const struct run *run, const struct recording *recording
             "%s: positive torque makes the motion accelerate backward: the sign of the torque or of the motion "
             "is wrong (--map %s=COLUMN*-1)",
             path_of(run), linear ? "force_N" : "torque_Nm");
-    const double far = 3.0, absurd = 100.0;
-    if (factor > absurd || factor < 1.0 / absurd)
-        return refuse_inertia(run, inertia, measured, out_error);
-    if (factor > far || factor < 1.0 / far)
-        oddities_add(io_oddities,
-                     "%s: the torque over the acceleration makes %.3g %s, the model's %s is %.3g %s: a wrong unit, "
-                     "or a model of something else.",
-                     path_of(run), measured, unit, name, inertia, unit);
-    return 0;
+    return compare_inertia(run, inertia, measured, io_oddities, out_error);
 }

@@ -38,7 +38,8 @@ size_t oddities_period(const struct run *run, const double *torque, struct oddit
 const char *oddities_unit(double factor, bool linear, bool motion, double *out_scale);
 
 /// Whether motion and torque go together as a model's inertia says: least squares of torque on acceleration.
-/// Errors: error_refused if the factor between the two is that of a unit, or above 100; a sentence if it is merely large
+/// Errors: error_refused if the factor between the two is that of a unit, or above 100; a sentence if it is
+/// merely large
 int oddities_of_inertia(const struct run *run, const struct recording *recording, double inertia,
                         struct oddities *io_oddities, struct error *out_error);
 

@@ -110,6 +110,11 @@ static bool take_motion(struct recording *r, const double *position, const doubl
     return good;
 }
 
+static size_t unwrap(const struct run *run, double *io_position)
+{
+    return io_position && !run->linear ? repair_unwrap(run->rows, io_position) : 0;
+}
+
 static int take_columns(const struct run *run, struct recording *r, struct error *out_error)
 {
     struct gain_input input = gain_find_input(run);
@@ -126,8 +131,7 @@ static int take_columns(const struct run *run, struct recording *r, struct error
     double *raw_position = copied(position, run->rows), *raw_velocity = copied(velocity, run->rows);
     bool copies = r->all.torque && (!input.reference || r->all.torque_ref) && (!position || raw_position) &&
                   (!velocity || raw_velocity);
-    if (copies && position && !run->linear)
-        r->turns = repair_unwrap(run->rows, raw_position);
+    r->turns = copies ? unwrap(run, raw_position) : 0;
     bool good = copies && fill_columns(r, raw_position, raw_velocity) && take_motion(r, raw_position, raw_velocity);
     free(raw_position);
     free(raw_velocity);

@@ -32,7 +32,7 @@ static void notice(const struct run *run, bool *rows, bool *io_lost, struct repa
     }
 }
 
-/// Turn of which an angle holds only the rest: jumps by one, and no other step of more than a tenth; 0 if there is none.
+/// Turn of which an angle holds only the rest: jumps by one, no other step of more than a tenth; 0 if there is none.
 static double find_turn(size_t rows, const double *x, size_t *out_jumps)
 {
     static const double turns[] = {6.283185307179586, 360.0, 1.0};

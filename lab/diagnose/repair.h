@@ -15,12 +15,13 @@ struct repair_finding {
 };
 
 /// Marks rows that `valid` says were lost and rows that an effect in the record spoils beyond doubt (12 nats and half
-/// the log of the number of rows), and single rows at which a motion column jumps away and back. Returns how many are marked; out_finding: the strongest such effect.
+/// the log of the number of rows), and single rows at which a motion column jumps away and back. Returns how many are
+/// marked; out_finding: the strongest such effect.
 /// Shapes: out_lost: run->rows
 size_t repair_find(const struct run *run, bool *out_lost, struct repair_finding *out_finding);
 
-/// Puts together an angle that begins anew at every turn, in rad, degrees or turns. Returns how often it did, 0 if it is
-/// none: every jump a turn within a tenth, every other step below a tenth of one, nothing beyond one turn.
+/// Puts together an angle that begins anew at every turn, in rad, degrees or turns. Returns how often it did, 0 if it
+/// is none: every jump a turn within a tenth, every other step below a tenth of one, nothing beyond one turn.
 size_t repair_unwrap(size_t rows, double *io_position);
 
 /// Fills the marked rows of a column. With a period: the mean of the other periods at that phase plus the deviation

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/diagnose/repeat.h"
 
+#include "lab/diagnose/hidden_mass.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -46,7 +48,7 @@ static void compare_effect(const struct hypothesis *h, const struct fit *fit, do
 }
 
 bool repeat_compare(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit,
-                    const struct fit_data *other, struct repeat *out_repeat)
+                    struct fit_data *other, struct evidence *other_evidence, struct repeat *out_repeat)
 {
     struct hypothesis moved = *hypothesis;
     struct fit again;
@@ -58,7 +60,9 @@ bool repeat_compare(const struct fit_data *data, const struct hypothesis *hypoth
         return true;
     if (!fit_init(&again, other))
         return false;
-    if (fit_run(&again, other, &moved, repeat_iterations))
+    bool good = hidden_mass_concerns(other, &moved) ? hidden_mass_fit(other, other_evidence, &again, &moved)
+                                                    : fit_run(&again, other, &moved, repeat_iterations);
+    if (good)
         for (int e = 0; sim_effects[e]; e++)
             if (hypothesis->named[e])
                 compare_effect(hypothesis, fit, misfit(fit, data), &moved, &again, misfit(&again, other), e,

@@ -19,6 +19,6 @@ struct repeat {
 ///            every run's own.
 /// Errors:    false if memory is short
 bool repeat_compare(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit,
-                    const struct fit_data *other, struct repeat *out_repeat);
+                    struct fit_data *other, struct evidence *other_evidence, struct repeat *out_repeat);
 
 #endif

@@ -89,6 +89,7 @@ size_t report_shares_find(const struct diagnosis_curves *curves, bool linear,
     struct sorter s = {.curves = curves};
     double nominal = 0.0, extended = 0.0, peak = 0.0;
     size_t count = 0;
+    const double nearly_all = 0.99; // of the samples: a sorting that has them in one part tells nothing apart
     if (curves->samples < 2)
         return 0;
     s.place = scale_of(curves->position, curves->samples);
@@ -98,7 +99,9 @@ size_t report_shares_find(const struct diagnosis_curves *curves, bool linear,
         peak = fmax(peak, fabs(curves->velocity[i]));
     }
     s.fast = 0.5 * peak;
-    for (int sorting = 0; sorting < sortings; sorting++)
+    for (int sorting = 0; sorting < sortings; sorting++) {
+        size_t before = count;
+        double largest = 0.0;
         for (size_t part = 0; part < parts_of[sorting]; part++) {
             struct report_share *share = &out_shares[count];
             memset(share, 0, sizeof *share);
@@ -110,7 +113,10 @@ size_t report_shares_find(const struct diagnosis_curves *curves, bool linear,
                 }
             name_part(&s, (enum sorting)sorting, part, linear, share->what);
             count += share->samples > 0.0;
+            largest = fmax(largest, share->samples);
         }
+        count = largest > nearly_all ? before : count;
+    }
     return count;
 }
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/diagnose/search.h"
 
+#include "lab/diagnose/hidden_mass.h"
 #include "lab/diagnose/scan.h"
 
 #include <math.h>
@@ -277,7 +278,7 @@ static void place_named_again(const struct fit_data *data, const struct sim_cove
                               struct fit *io_fit)
 {
     for (int e = 0; sim_effects[e]; e++)
-        if (io_h->named[e])
+        if (io_h->named[e] && !hidden_mass_holds(io_h, e))
             place_again(data, coverage, e, io_h, io_fit);
 }
 
@@ -353,9 +354,6 @@ bool search_run(const struct fit_data *data, const struct sim_coverage *coverage
     drop_unneeded(data, io_hypothesis, io_fit);
     if (options->progress && !options->progress(options->user, "searching"))
         return true;
-    for (int e = 0; sim_effects[e]; e++)
-        if (io_hypothesis->named[e] && sim_effects[e]->engage)
-            place_again(data, coverage, e, io_hypothesis, io_fit);
     if (named_count(io_hypothesis) < options->causes_max && add_best(data, coverage, io_hypothesis, io_fit)) {
         place_named_again(data, coverage, io_hypothesis, io_fit);
         drop_unneeded(data, io_hypothesis, io_fit);

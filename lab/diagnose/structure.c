@@ -80,7 +80,7 @@ static void keep(struct structure *s, const struct octave *at, double nats, doub
     s->excess = excess;
     s->first_bin = at->from;
     s->last_bin = at->to - 1;
-    snprintf(s->where, sizeof s->where, "%s", where);
+    snprintf(s->where, sizeof s->where, "%.*s", (int)sizeof s->where - 1, where);
 }
 
 /// Orthonormal slow courses over the periods: straight and, with six periods or more, curved.

@@ -41,8 +41,22 @@ static void replace_unit(const char *unit, const char *by, size_t size, char *io
     snprintf(io_text, size, "%s", out);
 }
 
+/// Takes out deviations of nothing: a number at the edge of what a fit allows it has none, and is not exact either.
+static void drop_zero_deviations(char *io_text)
+{
+    static const char zero[] = " +- 0";
+    const size_t length = sizeof zero - 1;
+    for (char *at = strstr(io_text, zero); at; at = strstr(at, zero)) {
+        if (at[length] == '.' || isalnum((unsigned char)at[length]))
+            at += length;
+        else
+            memmove(at, at + length, strlen(at + length) + 1);
+    }
+}
+
 void wording_in_units(const struct diagnosis *self, size_t size, char *io_text)
 {
+    drop_zero_deviations(io_text);
     // Longer units first: "Nm" is the beginning of "Nm s/rad".
     static const struct {
         const char *linear, *rotary, *linear_rest, *rotary_rest;

@@ -370,6 +370,14 @@ static void test_can_drive_longer_sync_time_out_reaches_the_drive(void)
     ok(bench.drive.operations->exchange(bench.drive.self, &still, &sample));
     TEST_ASSERT_EQUAL_UINT32(late + 1, bench.drive.operations->counters(bench.drive.self)->samples_late);
     bench.drive.operations->close(bench.drive.self);
+    // Nor is a heartbeat missed earlier than a SYNC, on either side.
+    bench.master.options.sync_timeout_us = 400000;
+    open_and_arm(&configuration);
+    inproc_bus_run(&bench.bus, bench.bus.now_ns / 1000 + 350000);
+    ok(bench.drive.operations->exchange(bench.drive.self, &still, &sample));
+    TEST_ASSERT_EQUAL_HEX16(0, bench.node.objects.error_code);
+    bench.drive.operations->close(bench.drive.self);
+    bench.master.options.sync_timeout_us = 50000;
     // A drive without an object for it is told by 1006 alone.
     bench.master.options.profile = &cia402_profile_generic;
     ok(bench.drive.operations->open(bench.drive.self, &configuration));

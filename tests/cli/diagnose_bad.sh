@@ -12,7 +12,7 @@ cat >given.json <<'JSON'
 JSON
 sed 's/"sample_rate_hz"/"effects": {"load_bias": {"bias_Nm": 0.1}}, "sample_rate_hz"/' given.json >true.json
 for run in 1 2; do
-    "$SERVOSCOPE" design --rate 1000 --period 1000 --lines linear:2:60:2 --limit-torque 1 --inertia 0.005 --method random \
+    "$SERVOSCOPE" design --rate 1000 --period 500 --lines linear:2:60:2 --limit-torque 1 --inertia 0.005 --method random \
         --seed $run --out table$run --quiet
     "$SERVOSCOPE" simulate --model true.json --table table$run.mst --periods 6 --out good$run.csv --quiet
 done
@@ -67,7 +67,7 @@ def repeat(keys, rows):
 
 
 def jump(keys, rows):
-    for i in (2500, 4100, 5100):
+    for i in (1500, 2100, 3100):
         rows[i][place] += 5
 
 
@@ -82,7 +82,7 @@ def count(keys, rows):
 
 
 def period(keys, rows):
-    keys[:] = [key.replace("period_samples: 1000", "period_samples: 900") for key in keys]
+    keys[:] = [key.replace("period_samples: 500", "period_samples: 430") for key in keys]
 
 
 def milliseconds(keys, rows):
@@ -139,9 +139,9 @@ refused repeat 'time_s: 0.249 follows 0.249: time has to increase'
 refused torn 'samples have to be equidistant (--rate HZ trusts the rate'
 handled torn 'the time stamps wander by 0\.[0-9]* samples' --rate 1000
 handled shaken 'the time stamps wander by 0\.0[0-9]* samples'
-handled jump 'jumps away for one row and back at 3 rows, first at row 2501'
+handled jump 'jumps away for one row and back at 3 rows, first at row 1501'
 handled wrap 'begins anew at every turn, [0-9]* times: it was put together'
-handled period 'period_samples says 900, but the torque repeats every'
+handled period 'period_samples says 430, but the torque repeats every'
 handled speed_sign 'Its sign is wrong'
 handled rpm 'rpm instead of rad/s'
 reported clip_torque 'torque_Nm stands at its largest value'

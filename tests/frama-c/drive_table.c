@@ -1,56 +1,97 @@
 /* SPDX-License-Identifier: MIT */
-/* Any bytes of any length up to eighty as a table: nothing beyond them is read. Eva knows ranges, not how the length
- * depends on the header's numbers, so the header is taken apart into cases: those numbers one by one where they could
- * fit, and any others at once, which it has to refuse. Together they are all there are. */
+/* Any bytes as a table: nothing is read beyond them. Eva knows ranges, not how the length depends on the header's
+ * numbers, so the header is taken apart into cases: those numbers one by one where they could fit, and all others at
+ * once, which have to be refused without help. Together they are all there are, for each length that is tried. */
 #include "tests/frama-c/any.h"
 
 #include "core/bytes.h"
 #include "msgen/table.h"
 
 enum {
-    bytes_max = 80,
-    samples_fit = (bytes_max - msgen_header_bytes) / 2, /* in one channel of 16 bits, and not even a bin beside them */
-    formats = 3,
+    bytes_max = 84,                         /* four samples in two channels of 16 bits, one bin, and travel */
+    least_bytes = msgen_header_bytes + 12u, /* four samples in one channel, one bin */
+    offset_version = 4,
     offset_channels = 6,
     offset_format = 7,
     offset_samples = 16,
     offset_bin_count = 20,
 };
 
-static uint8_t bytes[bytes_max];
+/* The table ends where this ends. */
+static uint8_t memory[bytes_max];
 static struct msgen_table table;
 
-static void open(uint8_t channels, uint8_t format, uint32_t samples, uint32_t bin_count)
+static void open(uint8_t *bytes, uint32_t size)
 {
+    if (msgen_table_open(bytes, size, &table) == core_ok) {
+        uint8_t header[msgen_header_travel_bytes];
+        msgen_table_encode_header(&table, header);
+    }
+}
+
+static void open_as(uint32_t size, uint8_t channels, uint8_t format, uint32_t samples, uint32_t bin_count)
+{
+    uint8_t *bytes = memory + bytes_max - size;
     bytes[offset_channels] = channels;
     bytes[offset_format] = format;
     core_put_u32(bytes + offset_samples, samples);
     core_put_u32(bytes + offset_bin_count, bin_count);
-    if (msgen_table_open(bytes, any_between(0, bytes_max), &table) == core_ok) {
-        uint8_t header[msgen_header_travel_bytes];
-        msgen_table_encode_header(&table, header);
+    open(bytes, size);
+}
+
+static void open_all(uint32_t size)
+{
+    open_as(size, 0, any_u8(), any_u32(), any_u32());
+    open_as(size, (uint8_t)any_between(msgen_channels_max + 1, UINT8_MAX), any_u8(), any_u32(), any_u32());
+    open_as(size, any_u8(), 0, any_u32(), any_u32());
+    open_as(size, any_u8(), (uint8_t)any_between(msgen_format_f32 + 1, UINT8_MAX), any_u32(), any_u32());
+    for (uint8_t channels = 1; channels <= msgen_channels_max; ++channels) {
+        for (uint8_t format = msgen_format_i16; format <= msgen_format_f32; ++format) {
+            uint32_t frame_bytes = channels * msgen_format_bytes((enum msgen_format)format);
+            uint32_t too_many = (size - msgen_header_bytes - 4u) / frame_bytes + 1u;
+            too_many = too_many > 4u ? too_many : 4u;
+            open_as(size, channels, format, any_between(0, 3), any_u32());
+            open_as(size, channels, format, any_between(too_many, UINT32_MAX), any_u32());
+            for (uint32_t samples = 4; samples < too_many; ++samples) {
+                uint32_t bins_max = (samples - 1u) / 2u;
+                open_as(size, channels, format, samples, 0);
+                open_as(size, channels, format, samples, any_between(bins_max + 1u, UINT32_MAX));
+                for (uint32_t bin_count = 1; bin_count <= bins_max; ++bin_count) {
+                    open_as(size, channels, format, samples, bin_count);
+                }
+            }
+        }
     }
-    //@ slevel merge;
+}
+
+static void forget(void)
+{
+    for (uint32_t i = 0; i < bytes_max; ++i) {
+        memory[i] = any_u8();
+    }
 }
 
 int main(void)
 {
-    for (uint32_t i = 0; i < bytes_max; ++i) {
-        bytes[i] = any_u8();
+    for (uint32_t size = 0; size < msgen_header_bytes; ++size) {
+        forget();
+        open(memory + bytes_max - size, size);
     }
-    open(0, any_u8(), any_u32(), any_u32());
-    open((uint8_t)any_between(msgen_channels_max + 1, UINT8_MAX), any_u8(), any_u32(), any_u32());
-    open(any_u8(), (uint8_t)any_between(formats, UINT8_MAX), any_u32(), any_u32());
-    for (uint8_t channels = 1; channels <= msgen_channels_max; ++channels) {
-        for (uint8_t format = 0; format < formats; ++format) {
-            open(channels, format, any_between(0, 3), any_u32());
-            open(channels, format, any_between(samples_fit, UINT32_MAX), any_u32());
-            for (uint32_t samples = 4; samples < samples_fit; ++samples) {
-                open(channels, format, samples, 0);
-                open(channels, format, samples, any_between((samples + 1u) / 2u, UINT32_MAX));
-                for (uint32_t bin_count = 1; bin_count < (samples + 1u) / 2u; ++bin_count) {
-                    open(channels, format, samples, bin_count);
-                }
+    static const uint32_t sizes[] = {56, 57, 60, 63, 64, 67, least_bytes, 70, 72, 73, bytes_max};
+    for (uint32_t i = 0; i < sizeof sizes / sizeof *sizes; ++i) {
+        uint8_t *version = memory + bytes_max - sizes[i] + offset_version;
+        forget();
+        core_put_u16(version, 0);
+        open(memory + bytes_max - sizes[i], sizes[i]);
+        core_put_u16(version, (uint16_t)any_between(msgen_table_version_travel + 1, UINT16_MAX));
+        open(memory + bytes_max - sizes[i], sizes[i]);
+        for (uint16_t v = msgen_table_version; v <= msgen_table_version_travel; ++v) {
+            forget();
+            core_put_u16(version, v);
+            if (sizes[i] < least_bytes) {
+                open(memory + bytes_max - sizes[i], sizes[i]);
+            } else {
+                open_all(sizes[i]);
             }
         }
     }

@@ -472,6 +472,48 @@ static void test_block_keeps_a_period_as_long_as_its_banks_allow(void)
     }
 }
 
+/* A period that is complete when the DFT is started over can be read from then on, whatever work on it was still to be
+ * spread. */
+static void test_block_restart_finishes_the_period_before(void)
+{
+    const uint32_t period = 96;
+    spread_bins(40, 5);
+    build(period, &folded_32);
+    fill_random(period);
+    struct frf_block dft;
+    struct frf_block_period latched;
+    start(&dft, 1, 2, true);
+    frf_block_add_i16(&dft, samples, period);
+    TEST_ASSERT_FALSE(frf_block_latest(&dft, &latched));
+    frf_block_restart(&dft);
+    TEST_ASSERT_TRUE(frf_block_latest(&dft, &latched));
+    TEST_ASSERT_EQUAL_UINT32(1, latched.sequence);
+    TEST_ASSERT_EQUAL_UINT32(0, latched.reasons);
+}
+
+/* Gaps that always end after a period's first part: what is folded never holds more than a period, so the table's bound
+ * on the sums stays true; any number of samples at the rail would overflow else. */
+static void test_block_gaps_do_not_pile_up_in_the_folded_period(void)
+{
+    const uint32_t period = 64, repeats = 4, part_samples = period / repeats;
+    const struct frf_block_layout small = {8, 8, repeats};
+    struct frf_block dft;
+    regular_bins(28, 4, 0);
+    build(period, &small);
+    for (uint32_t n = 0; n < period; n++)
+        samples[n] = INT16_MIN;
+    start(&dft, 1, 1, false);
+    frf_block_add_i16(&dft, samples, part_samples);
+    for (unsigned p = 0; p < 20; p++) {
+        frf_block_add_i16(&dft, samples, part_samples);
+        frf_block_skip(&dft, period - part_samples);
+        frf_block_add_i16(&dft, samples, period - part_samples);
+        for (uint32_t i = 0; i < part_samples; i++)
+            TEST_ASSERT_TRUE(part[i] >= INT16_MIN * (int32_t)repeats);
+        frf_block_skip(&dft, part_samples);
+    }
+}
+
 /* Rails and marks belong to their period also where its last block is filled up with zeros, which are no samples. */
 static void test_block_marks_and_rails_hold_for_one_period(void)
 {
@@ -641,6 +683,8 @@ int main(void)
     RUN_TEST(test_block_folded_period_cannot_overflow);
     RUN_TEST(test_block_gap_anywhere_spoils_only_its_periods);
     RUN_TEST(test_block_keeps_a_period_as_long_as_its_banks_allow);
+    RUN_TEST(test_block_restart_finishes_the_period_before);
+    RUN_TEST(test_block_gaps_do_not_pile_up_in_the_folded_period);
     RUN_TEST(test_block_marks_and_rails_hold_for_one_period);
     RUN_TEST(test_block_shared_basis_keeps_out_what_is_above);
     RUN_TEST(test_block_choice_builds_and_is_cheaper_than_folding);

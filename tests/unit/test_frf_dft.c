@@ -611,6 +611,27 @@ static void test_dft_saturation_at_the_rail_and_one_below(void)
     TEST_ASSERT_EQUAL_UINT32(2, dft.err.saturated);
 }
 
+/* Two periods in one call: the rail that the second one's first sample reaches is its own, and counts once. */
+static void test_dft_saturation_belongs_to_its_period(void)
+{
+    const uint32_t period = 16;
+    build_tables(period);
+    spread_bins(period, 3);
+    struct frf_dft dft;
+    struct frf_period latched;
+    struct frf_dft_config config = configuration(2);
+    TEST_ASSERT_EQUAL_INT(core_ok, frf_dft_init_q31(&dft, &config, &twiddles_q31));
+    memset(samples, 0, sizeof samples);
+    samples[2 * period] = INT16_MAX;
+    frf_dft_add_i16(&dft, samples, period + 1u);
+    TEST_ASSERT_TRUE(frf_dft_latest(&dft, &latched));
+    TEST_ASSERT_EQUAL_UINT32(0, latched.reasons);
+    TEST_ASSERT_EQUAL_UINT32(1, dft.err.saturated);
+    frf_dft_add_i16(&dft, samples, period - 1u);
+    TEST_ASSERT_TRUE(frf_dft_latest(&dft, &latched));
+    TEST_ASSERT_EQUAL_UINT32(frf_reason_saturated, latched.reasons);
+}
+
 static void test_dft_float_leaves_out_what_is_not_finite(void)
 {
     const uint32_t period = 16;
@@ -734,6 +755,7 @@ int main(void)
     RUN_TEST(test_dft_gap_anywhere_spoils_only_its_periods);
     RUN_TEST(test_dft_marks_hold_for_one_period);
     RUN_TEST(test_dft_saturation_at_the_rail_and_one_below);
+    RUN_TEST(test_dft_saturation_belongs_to_its_period);
     RUN_TEST(test_dft_float_leaves_out_what_is_not_finite);
     RUN_TEST(test_dft_restart_begins_a_clean_period);
     RUN_TEST(test_twiddles_are_symmetric_and_correctly_rounded);

@@ -173,16 +173,24 @@ static void test_statistics_std_is_what_experiments_scatter(void)
     }
 }
 
+static void expect_no_scatter(const struct frf_estimate *estimate)
+{
+    TEST_ASSERT_TRUE(estimate->std == 0 && estimate->input_variance == 0 && estimate->output_variance == 0);
+    TEST_ASSERT_TRUE(estimate->covariance.real == 0 && estimate->covariance.imaginary == 0);
+}
+
 static void test_estimate_says_why_it_is_invalid(void)
 {
     struct frf_estimate estimate;
     frf_statistics_estimate(&statistics, 0, 0, &estimate);
     TEST_ASSERT_EQUAL_INT(frf_invalid_input, estimate.validity);
+    TEST_ASSERT_TRUE(estimate.real == 0 && estimate.imaginary == 0);
+    expect_no_scatter(&estimate);
     add_same(2 + I, 4 + 2 * I);
     frf_statistics_estimate(&statistics, 0, 0, &estimate);
     TEST_ASSERT_EQUAL_INT(frf_invalid_periods, estimate.validity);
     TEST_ASSERT_DOUBLE_WITHIN(rounding, 2, estimate.real);
-    TEST_ASSERT_TRUE(estimate.std == 0);
+    expect_no_scatter(&estimate);
     add_same(2 + I, 4 + 2 * I);
     frf_statistics_estimate(&statistics, 0, 0, &estimate);
     TEST_ASSERT_EQUAL_INT(frf_valid, estimate.validity);
@@ -222,7 +230,8 @@ static void test_estimate_never_returns_nan_or_infinity(void)
     add_same(1e200, 1e200);
     frf_statistics_estimate(&statistics, 0, 0, &estimate);
     TEST_ASSERT_EQUAL_INT(frf_invalid_not_finite, estimate.validity);
-    TEST_ASSERT_TRUE(isfinite(estimate.real) && isfinite(estimate.std));
+    TEST_ASSERT_TRUE(estimate.real == 0 && estimate.imaginary == 0);
+    expect_no_scatter(&estimate);
 }
 
 static void test_statistics_leave_out_periods_that_are_not_finite(void)

@@ -144,6 +144,78 @@ static void test_oddities_say_that_time_stamps_wander(void)
     assert_said("wander");
 }
 
+static void test_oddities_take_a_period_that_is_far_from_what_the_file_says(void)
+{
+    run.period_samples = 430;
+    prepare();
+    TEST_ASSERT_EQUAL_UINT(0, period % recording.block.samples);
+    assert_said("period_samples says 430, but the torque repeats");
+}
+
+static void test_oddities_tell_a_clipped_position_from_one_that_rests(void)
+{
+    for (size_t n = 0; n < rows; n++)
+        position[n] = fmin(fmax(position[n], -0.1), 0.1);
+    prepare();
+    assert_said("position_rad stands at its largest value");
+    recording_free(&recording);
+    for (size_t n = 0; n < rows; n++) { // there and back, with a rest at both ends
+        double u = fmin(fmax(1.5 * sin(two_pi * (double)n / period), -1.0), 1.0);
+        position[n] = sin(0.25 * two_pi * u);
+        velocity[n] = torque[n] = cos(two_pi * (double)n / period);
+    }
+    prepare();
+    for (size_t i = 0; i < recording.oddities.count; i++)
+        TEST_ASSERT_NULL_MESSAGE(strstr(recording.oddities.texts[i], "position_rad stands"),
+                                 recording.oddities.texts[i]);
+}
+
+static void assert_refused(const char *part)
+{
+    TEST_ASSERT_EQUAL_INT(error_refused, recording_prepare(&run, &recording, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, part), error.message);
+}
+
+static void test_oddities_refuse_a_position_in_counts(void)
+{
+    for (size_t n = 0; n < rows; n++)
+        position[n] = round(position[n] * 8192.0 / two_pi);
+    assert_refused("encoder counts");
+}
+
+static void test_oddities_refuse_a_reference_of_another_unit_or_sign(void)
+{
+    double *reference = run_add_column(&run, "torque_ref_Nm");
+    torque = (double *)run_column(&run, "torque_Nm");
+    for (size_t n = 0; n < rows; n++)
+        reference[n] = 1000.0 * torque[n];
+    assert_refused("torque_ref_Nm is 1e+03 times torque_Nm");
+    scale(reference, -1e-3);
+    assert_refused("opposite sign");
+    scale(reference, -1.0);
+    prepare();
+}
+
+static void test_oddities_refuse_time_in_ms(void)
+{
+    double *time = run_add_column(&run, "time_s");
+    for (size_t n = 0; n < rows; n++)
+        time[n] = (double)n;
+    run.sample_rate_hz = 1.0;
+    assert_refused("looks like ms");
+}
+
+static void test_oddities_refuse_an_inertia_that_no_drive_is_off_by(void)
+{
+    prepare();
+    TEST_ASSERT_EQUAL_INT(error_refused,
+                          oddities_of_inertia(&run, &recording, 1e-3 * inertia, &recording.oddities, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "mNm instead of Nm"), error.message);
+    TEST_ASSERT_EQUAL_INT(error_refused,
+                          oddities_of_inertia(&run, &recording, 300.0 * inertia, &recording.oddities, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "a model of something else"), error.message);
+}
+
 static void test_oddities_refuse_numbers_that_no_drive_has(void)
 {
     scale(torque, 1e-150);
@@ -193,6 +265,12 @@ int main(void)
     RUN_TEST(test_oddities_say_that_a_signal_is_clipped);
     RUN_TEST(test_oddities_say_that_time_stamps_wander);
     RUN_TEST(test_oddities_say_that_a_position_has_no_noise);
+    RUN_TEST(test_oddities_take_a_period_that_is_far_from_what_the_file_says);
+    RUN_TEST(test_oddities_tell_a_clipped_position_from_one_that_rests);
+    RUN_TEST(test_oddities_refuse_a_position_in_counts);
+    RUN_TEST(test_oddities_refuse_a_reference_of_another_unit_or_sign);
+    RUN_TEST(test_oddities_refuse_time_in_ms);
+    RUN_TEST(test_oddities_refuse_an_inertia_that_no_drive_is_off_by);
     RUN_TEST(test_oddities_refuse_numbers_that_no_drive_has);
     return UNITY_END();
 }

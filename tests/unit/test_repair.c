@@ -118,6 +118,43 @@ static void test_repair_takes_the_nearest_row_at_the_ends(void)
     memset(lost, 0, sizeof lost);
 }
 
+static void test_repair_marks_a_row_that_jumps_away_and_back(void)
+{
+    position[700] += 3.0;
+    velocity[1100] -= 40.0;
+    TEST_ASSERT_EQUAL_UINT(2, repair_find(&run, lost, &finding));
+    TEST_ASSERT_TRUE(lost[700] && lost[1100]);
+    TEST_ASSERT_EQUAL_UINT(2, finding.spikes);
+    TEST_ASSERT_EQUAL_UINT(700, finding.first_spike);
+    TEST_ASSERT_EQUAL_INT(-1, finding.effect);
+}
+
+static void test_repair_puts_an_angle_together(void)
+{
+    static const double turns[] = {6.283185307179586, 360.0, 1.0};
+    for (size_t i = 0; i < 3; i++) {
+        for (size_t n = 0; n < rows; n++) // three turns there, and back again
+            position[n] = turns[i] * (0.3 + 3.0 * sin(two_pi * (double)n / rows));
+        memcpy(whole, position, sizeof whole);
+        for (size_t n = 0; n < rows; n++)
+            position[n] -= turns[i] * floor(position[n] / turns[i]);
+        TEST_ASSERT_EQUAL_UINT(12, repair_unwrap(rows, position));
+        for (size_t n = 0; n < rows; n++)
+            TEST_ASSERT_DOUBLE_WITHIN(1e-9 * turns[i], whole[n] - whole[0], position[n] - position[0]);
+        TEST_ASSERT_EQUAL_UINT(0, repair_unwrap(rows, position)); // it is whole now
+    }
+}
+
+static void test_repair_lets_an_angle_dither_about_its_zero(void)
+{
+    for (size_t n = 0; n < rows; n++) {
+        position[n] = 0.001 * sin(0.9 * (double)n) + 0.1 * sin(two_pi * (double)n / rows);
+        position[n] += position[n] < 0.0 ? two_pi : 0.0;
+    }
+    TEST_ASSERT_EQUAL_UINT(0, repair_find(&run, lost, &finding));
+    TEST_ASSERT_GREATER_THAN_UINT(0, repair_unwrap(rows, position));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -127,5 +164,8 @@ int main(void)
     RUN_TEST(test_repair_fills_a_gap_from_the_other_periods);
     RUN_TEST(test_repair_fills_a_short_gap_without_periods);
     RUN_TEST(test_repair_takes_the_nearest_row_at_the_ends);
+    RUN_TEST(test_repair_marks_a_row_that_jumps_away_and_back);
+    RUN_TEST(test_repair_puts_an_angle_together);
+    RUN_TEST(test_repair_lets_an_angle_dither_about_its_zero);
     return UNITY_END();
 }

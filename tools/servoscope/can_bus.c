@@ -56,8 +56,8 @@ static int open_slcan(struct can_bus *self, const char *address, const char *opt
                       : slcan_connect_tcp(&self->slcan, host, port, bitrate, reason, sizeof reason);
     } else {
         return error_set(out_error, error_usage,
-                         "%s: 'slcan:%s', expected slcan:HOST:PORT (port %ld..65535) or slcan:/PATH of a serial device", option,
-                         address, port_lowest);
+                         "%s: 'slcan:%s', expected slcan:HOST:PORT (port %ld..65535) or slcan:/PATH of a serial device",
+                         option, address, port_lowest);
     }
     return done ? 0 : error_set(out_error, error_refused, "%s: slcan:%s", option, reason);
 }

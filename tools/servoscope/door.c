@@ -26,8 +26,10 @@ int door_open(const char *url, const struct sim_model *model, struct door *out_d
         }
         snprintf(&forms[used], sizeof forms - used, "%s%s", i == 0 ? "" : ", ", scheme->form);
     }
-    return error_set(out_error, error_usage, "--drive: '%s' is no drive that this program can reach; expected %s%s", url,
-                     forms);
+    return error_set(out_error, error_usage,
+                     "--drive: '%s' is no drive that this program can reach; expected %s, "
+                     "modbus-tcp:HOST:PORT or modbus-rtu:DEVICE:BAUD",
+                     url, forms);
 }
 
 bool door_has_statistics(const struct door *self)
@@ -66,12 +68,31 @@ static int read_number(const char *name, const char *text, long lowest, long hig
     return 0;
 }
 
+/// Whether a name is one of a list separated by blanks.
+static bool is_among(const char *name, const char *list)
+{
+    const size_t length = strlen(name);
+    for (const char *at = list; *at != '\0'; at += strspn(at, " ")) {
+        const size_t item = strcspn(at, " ");
+        if (item == length && strncmp(at, name, length) == 0) {
+            return true;
+        }
+        at += item;
+    }
+    return false;
+}
+
 static int read_pair(const struct door_scheme *scheme, char *pair, struct door_query *io_query, struct error *out_error)
 {
     char *equals = strchr(pair, '=');
     const char *value = equals ? equals + 1 : "";
     if (equals) {
         *equals = '\0';
+    }
+    if (!is_among(pair, scheme->asked)) {
+        return error_set(out_error, error_usage,
+                         "--drive: '%s' is nothing that can be asked behind '?' of %s; expected one of: %s", pair,
+                         scheme->form, scheme->asked);
     }
     if (strcmp(pair, "node") == 0) {
         return read_number(pair, value, scheme->node_lowest, scheme->node_highest, &io_query->node, out_error);
@@ -88,12 +109,8 @@ static int read_pair(const struct door_scheme *scheme, char *pair, struct door_q
                    ? status
                    : error_set(out_error, error_usage, "--drive: kt=%s: expected a torque constant above 0", value);
     }
-    if (strcmp(pair, "profile") == 0 && *value != '\0') {
-        snprintf(io_query->profile, sizeof io_query->profile, "%s", value);
-        return 0;
-    }
-    return error_set(out_error, error_usage, "--drive: '%s' is nothing that can be asked behind '?'; expected %s", pair,
-                     scheme->form);
+    snprintf(io_query->profile, sizeof io_query->profile, "%s", value); // the one that is left
+    return *value != '\0' ? 0 : error_set(out_error, error_usage, "--drive: profile=: expected the name of a make");
 }
 
 int door_read_query(const struct door_scheme *scheme, const char *rest, struct door_query *out_query,

@@ -148,6 +148,7 @@ static void free_bus(struct door *door)
 const struct door_scheme door_can = {
     .prefix = "can:",
     .form = "can:IFACE?node=N",
+    .asked = "node bitrate profile sync_timeout_ms",
     .node_default = 5,
     .node_lowest = 1,
     .node_highest = 127,
@@ -159,6 +160,7 @@ const struct door_scheme door_can = {
 const struct door_scheme door_slcan = {
     .prefix = "slcan:",
     .form = "slcan:HOST:PORT?node=N",
+    .asked = "node bitrate profile sync_timeout_ms",
     .node_default = 5,
     .node_lowest = 1,
     .node_highest = 127,

@@ -119,6 +119,7 @@ static void free_bus(struct door *door)
 const struct door_scheme door_odrive = {
     .prefix = "odrive:",
     .form = "odrive:IFACE?node=N",
+    .asked = "node bitrate kt",
     .node_default = 0,
     .node_lowest = 0,
     .node_highest = odrive_node_max,
@@ -130,6 +131,7 @@ const struct door_scheme door_odrive = {
 const struct door_scheme door_odrive_slcan = {
     .prefix = "odrive-slcan:",
     .form = "odrive-slcan:HOST:PORT?node=N",
+    .asked = "node bitrate kt",
     .node_default = 0,
     .node_lowest = 0,
     .node_highest = odrive_node_max,

@@ -12,6 +12,7 @@
 struct door_scheme {
     const char *prefix;                           ///< "can:"
     const char *form;                             ///< how a whole URL looks, for messages
+    const char *asked;                            ///< names that may stand behind its '?', separated by blanks
     long node_default, node_lowest, node_highest; ///< of door_read_query
     /// Makes the door of what follows the prefix. `model` as door_open has it.
     int (*open)(const char *rest, const struct sim_model *model, struct door *out_door, struct error *out_error);

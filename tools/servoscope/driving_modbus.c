@@ -46,7 +46,7 @@ static int open_server(const struct driving_request *request, const char *name, 
     const bool tcp = strncmp(name, "tcp:", 4) == 0, rtu = strncmp(name, "rtu:", 4) == 0;
     if ((!tcp && !rtu) || !place_split(name + 4, where, sizeof where, &number) || (tcp && number > 65535)) {
         return error_set(out_error, error_usage,
-                         "--modbus: '%s': expected tcp:HOST:PORT (port 0..65535) or rtu:DEVICE:BAUD", name);
+                         "--modbus: '%s': expected tcp:HOST:PORT or rtu:DEVICE:BAUD, port 0..65535", name);
     }
     if (tcp) {
         opened = modbus_server_open_tcp(out_server, &drive->map, name + 4, text, sizeof text);

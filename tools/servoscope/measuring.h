@@ -53,8 +53,8 @@ size_t measuring_options(struct measuring_request *request, struct option *out_o
 int measuring_prepare(const struct measuring_request *request, struct measuring *out_self, struct error *out_error);
 
 /// Measures through an unopened drive, writes the run file (also what was kept of a measurement that ended early), or
-/// the runs of a sequence and their manifest, and the page; shows progress, prints a summary. `source` names the drive in the run (key
-/// `drive`). Ctrl-C ramps down while this runs.
+/// the runs of a sequence and their manifest, and the page; shows progress, prints a summary. `source` names the drive
+/// in the run (key `drive`). Ctrl-C ramps down while this runs.
 /// Errors: error_refused if the measurement is not complete or not written
 int measuring_run(struct measuring *self, const struct drive *drive, const char *source,
                   const struct command_context *context, struct error *out_error);

@@ -4,6 +4,7 @@
 #include "core/bytes.h"
 #include "drivers/modbus/host.h"
 #include "ports/modbus_host.h"
+#include "ports/place.h"
 #include "tools/servoscope/interrupt.h"
 #include "tools/servoscope/modbus_response.h"
 
@@ -94,7 +95,10 @@ static int connect_drive(struct job *self, const char *url, struct error *out_er
     self->port = tcp ? modbus_port_open_tcp(place, &options, text, sizeof text)
                      : modbus_port_open_rtu(place, &options, text, sizeof text);
     if (!self->port) {
-        return error_set(out_error, error_refused, "--drive: %s", text);
+        char name[sizeof place];
+        long number;
+        const bool formed = place_split(place, name, sizeof name, &number);
+        return error_set(out_error, formed ? error_refused : error_usage, "--drive: %s", text);
     }
     self->link = modbus_port_link(self->port);
     enum modbus_host_status opened =
@@ -166,12 +170,14 @@ static struct modbus_host_setup make_setup(const struct job *self)
     return setup;
 }
 
-static void show_upload(void *context, size_t done, size_t total)
+/// False once the user wants no more: a table takes minutes at 9600 bit/s.
+static bool show_upload(void *context, size_t done, size_t total)
 {
     struct job *self = context;
     if (terminal_line_due(&self->line)) {
         fprintf(stderr, "\rupload %3.0f %%   ", 100.0 * (double)done / (double)total);
     }
+    return !*interrupt_flag();
 }
 
 static int check_room(const struct job *self, struct error *out_error)
@@ -201,6 +207,10 @@ static int set_up(struct job *self, struct error *out_error)
     got = got == modbus_host_ok
               ? modbus_host_upload(&self->host, self->measuring->table.bytes, &setup, show_upload, self)
               : got;
+    if (*interrupt_flag()) { // nothing begins to move after that
+        terminal_line_clear(&self->line);
+        return error_set(out_error, error_refused, "stopped early: interrupted by the user before anything was played");
+    }
     got = got == modbus_host_ok ? modbus_host_command(&self->host, modbus_command_arm) : got;
     got = got == modbus_host_ok ? modbus_host_command(&self->host, modbus_command_start) : got;
     return got == modbus_host_ok ? 0 : refuse(self, got, out_error);

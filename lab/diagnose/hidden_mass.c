@@ -1,0 +1,113 @@
+/* SPDX-License-Identifier: MIT */
+#include "lab/diagnose/hidden_mass.h"
+
+#include <math.h>
+#include <stdint.h>
+
+enum { iterations = 10 };
+
+static bool is_hidden(int effect)
+{
+    return sim_effects[effect]->engage || sim_effects[effect]->attach;
+}
+
+bool hidden_mass_concerns(const struct fit_data *data, const struct hypothesis *hypothesis)
+{
+    struct sim_model model;
+    bool named = hypothesis->engaged.structure != hypothesis->given->structure, periodic = true;
+    for (int e = 0; sim_effects[e]; e++)
+        named = named || (hypothesis->named[e] && sim_effects[e]->attach);
+    for (size_t i = 0; i < data->runs; i++)
+        periodic = periodic && data->evidence[i].recording->periodic;
+    hypothesis_model(hypothesis, NULL, &model);
+    return named && periodic && !contrast_concerns(&model);
+}
+
+bool hidden_mass_fit(struct fit_data *data, struct evidence *evidence, struct fit *fit,
+                     struct hypothesis *io_hypothesis)
+{
+    data->renewed = evidence;
+    bool good = fit_run(fit, data, io_hypothesis, iterations);
+    // The last derivative left its own noise behind.
+    fit_cost(fit, data, io_hypothesis, io_hypothesis->x);
+    data->renewed = NULL;
+    return good;
+}
+
+/// What the noise depends on: the numbers of the structure, and the inertias between which it divides.
+static bool is_of_structure(const struct coordinate *c)
+{
+    static const size_t fields[] = {
+        offsetof(struct sim_model, motor_inertia_kgm2), offsetof(struct sim_model, load_inertia_kgm2),
+        offsetof(struct sim_model, belt_stiffness_Nm_per_rad), offsetof(struct sim_model, belt_damping_Nms_per_rad)};
+    if (c->effect >= 0 && is_hidden(c->effect))
+        return true;
+    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
+        if (c->model_offset == fields[i])
+            return true;
+    return false;
+}
+
+void hidden_mass_hold(struct hypothesis *io_hypothesis, struct hypothesis *out_free)
+{
+    *out_free = *io_hypothesis;
+    for (size_t i = 0; i < io_hypothesis->count; i++)
+        if (is_of_structure(&io_hypothesis->coordinates[i]))
+            io_hypothesis->coordinates[i].lower = io_hypothesis->coordinates[i].upper = io_hypothesis->x[i];
+}
+
+void hidden_mass_release(const struct hypothesis *free, struct hypothesis *io_hypothesis)
+{
+    for (size_t i = 0; i < io_hypothesis->count; i++)
+        for (size_t j = 0; j < free->count; j++) {
+            struct coordinate *c = &io_hypothesis->coordinates[i];
+            const struct coordinate *was = &free->coordinates[j];
+            if (c->effect == was->effect && c->parameter == was->parameter && c->model_offset == was->model_offset &&
+                c->unit == was->unit)
+                *c = *was;
+        }
+}
+
+bool hidden_mass_holds(const struct hypothesis *hypothesis, int effect)
+{
+    for (size_t i = 0; i < hypothesis->count; i++) {
+        const struct coordinate *c = &hypothesis->coordinates[i];
+        if (c->effect == effect && is_hidden(effect) && c->lower == c->upper)
+            return true;
+    }
+    return false;
+}
+
+/// Fits a structure from two places of its scan, half way and three quarters.
+static void try_structure(struct fit_data *data, struct evidence *evidence, const struct sim_coverage *coverage,
+                          const struct hypothesis *before, int effect, double *io_cost, struct fit *fit,
+                          struct hypothesis *io_best)
+{
+    struct sim_model model;
+    double values[sim_effect_parameters_max];
+    size_t total = 0;
+    hypothesis_model(before, NULL, &model);
+    while (sim_effects[effect]->scan(&model, coverage, total, values))
+        total++;
+    for (size_t quarter = 2; quarter <= 3 && total > 0; quarter++) {
+        struct hypothesis trial = *before;
+        sim_effects[effect]->scan(&model, coverage, quarter * total / 4, values);
+        hypothesis_name(&trial, effect, values);
+        if (hidden_mass_concerns(data, &trial) && hidden_mass_fit(data, evidence, fit, &trial) &&
+            fit->cost < *io_cost) {
+            *io_cost = fit->cost;
+            *io_best = trial;
+        }
+    }
+}
+
+bool hidden_mass_instead(struct fit_data *data, struct evidence *evidence, const struct sim_coverage *coverage,
+                         const struct hypothesis *before, double cost, struct fit *fit, struct hypothesis *io_h)
+{
+    double best = cost;
+    for (int e = 0; sim_effects[e]; e++)
+        if (sim_effects[e]->engage && hypothesis_may_name(before, e) &&
+            before->engaged.structure == before->given->structure)
+            try_structure(data, evidence, coverage, before, e, &best, fit, io_h);
+    return best < cost && hidden_mass_fit(data, evidence, fit, io_h);
+}
