@@ -336,11 +336,12 @@ static enum drive_status write_sync(struct cia402_master *self)
     return status == drive_ok ? write_all(self, &period, 1) : status;
 }
 
-/// Three heartbeats, or as long as SYNC is waited for: a machine that may be late with one may be so with the other.
+/// Three heartbeats, or one more than SYNC is waited for: what a late SYNC is forgiven for is no lost heartbeat, and
+/// the last one may have come just before its successor was due.
 static uint32_t heartbeat_lost_after_ms(const struct cia402_master *self)
 {
-    const uint32_t three_ms = 3u * self->options.heartbeat_ms, sync_ms = self->options.sync_timeout_us / 1000u;
-    return sync_ms > three_ms ? sync_ms : three_ms;
+    const uint32_t one_ms = self->options.heartbeat_ms, sync_ms = self->options.sync_timeout_us / 1000u;
+    return sync_ms > 2u * one_ms ? sync_ms + one_ms : 3u * one_ms;
 }
 
 static enum drive_status write_parameters(struct cia402_master *self, struct parameter units, struct parameter exponent)

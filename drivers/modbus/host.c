@@ -43,12 +43,32 @@ static void put_f32(uint16_t *out_words, float value)
 
 // ---- Attempts
 
+/// What an exception of this map means (docs/modbus.md).
+static const char *exception_str(int code)
+{
+    switch (code) {
+    case modbus_exception_function:
+        return "no such function";
+    case modbus_exception_address:
+        return "no such register";
+    case modbus_exception_value:
+        return "a value out of range, or not in this state";
+    case modbus_exception_device:
+        return "the drive cannot do it now";
+    case modbus_exception_busy:
+        return "another client commands";
+    default:
+        return "none of this register map";
+    }
+}
+
 /// Notes a failure and settles the link. Returns whether another attempt makes sense; *io_status says what to report.
 static bool try_again(struct modbus_host *self, const char *doing, int link_status, enum modbus_host_status *io_status)
 {
     const char *name = self->link->name(self->link->self);
     if (link_status > 0) {
-        snprintf(self->detail, sizeof self->detail, "%s: %s: exception %02d", name, doing, link_status);
+        snprintf(self->detail, sizeof self->detail, "%s: %s: exception %02d (%s)", name, doing, link_status,
+                 exception_str(link_status));
         *io_status = modbus_host_refused;
         return false;
     }

@@ -293,12 +293,12 @@ static void keep_tone(struct evidence *c, double *powers, double power, double f
     c->tones_hz[at] = frequency_hz;
 }
 
-/// Evidence in nats for a line at point j against the mean power about it, the line itself and its skirt left out: noise
-/// may have peaks of its own, narrower than the whitening knows, where a load swings under it.
+/// Evidence in nats for a line at point j against the mean power about it, the line itself and its skirt left out:
+/// noise may have peaks of its own, narrower than the whitening knows, where a load swings under it.
 /// Equation:  m ln(1 + P / (m mean)), the log of how seldom noise does that; a mean of m powers is itself uncertain
 static double line_nats(const struct recording *r, const double *power, size_t points, size_t j)
 {
-    size_t skirt = 2 * padding, count = 0, reach = padding * (2 * r->periods > 12 ? 2 * r->periods : 12);
+    size_t skirt = 2 * padding, count = 0, reach = padding * (5 * r->periods > 30 ? 5 * r->periods : 30);
     double sum = 0.0;
     for (size_t i = j > reach ? j - reach : 1; i < points && i <= j + reach; i++) {
         if (i + skirt < j || i > j + skirt) {
@@ -316,7 +316,8 @@ static void pick_tones(const struct evidence *e, const double *power, size_t poi
 {
     const struct recording *r = e->recording;
     double powers[sim_tones_max], hz_per_point = r->rate_hz / ((double)r->block.samples * points_per_bin);
-    double chance = 12.0 + log((double)points / padding); // as many lines as there are bins were looked at
+    // As many lines as there are bins were looked at; what it takes for a name or a verdict comes later.
+    double chance = 6.0 + log((double)points / padding);
     out->tone_count = 0;
     out->tone_nats = 0.0;
     for (size_t j = 2 * padding; j + 1 < points; j++) {

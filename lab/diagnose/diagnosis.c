@@ -3,6 +3,7 @@
 
 #include "lab/diagnose/blackbox.h"
 #include "lab/diagnose/gain.h"
+#include "lab/diagnose/gain_tie.h"
 #include "lab/diagnose/hidden_mass.h"
 #include "lab/diagnose/hold.h"
 #include "lab/diagnose/inertia_guess.h"
@@ -427,6 +428,30 @@ static bool names_new_mass(const struct hypothesis *before, const struct hypothe
     return false;
 }
 
+/// Drops a hidden mass without which the rest does as well, each with its own noise. Returns whether memory sufficed.
+static bool drop_hidden_mass(struct work *w, struct hypothesis *h, struct sim_model *io_model)
+{
+    if (!fit_hidden_mass(w, h, io_model))
+        return false;
+    double cost = w->fit.cost;
+    for (int e = 0; sim_effects[e]; e++) {
+        struct hypothesis without = *h;
+        struct sim_model model;
+        if (!h->named[e] || !hidden_mass_is(e))
+            continue;
+        hypothesis_unname(&without, e);
+        hypothesis_model(&without, NULL, &model);
+        if (!fit_anew(w, &without, &model) || !fit_anew(w, &without, &model))
+            return false;
+        if (w->fit.cost < cost + 2.0 * search_threshold(&w->fit_data, e)) {
+            *h = without;
+            *io_model = model;
+            return true;
+        }
+    }
+    return fit_hidden_mass(w, h, io_model);
+}
+
 /// One round of the search. The structure stays where it is meanwhile if the noise depends on it.
 static bool search_once(struct work *w, const struct search_options *options, struct hypothesis *h,
                         struct sim_model *io_model)
@@ -439,6 +464,8 @@ static bool search_once(struct work *w, const struct search_options *options, st
     if (concerned)
         hidden_mass_release(&free, h);
     hypothesis_model(h, NULL, io_model);
+    if (good && concerned && same_names(&before, h))
+        return drop_hidden_mass(w, h, io_model);
     if (!good || !names_new_mass(&before, h) || !hidden_mass_concerns(&w->fit_data, h))
         return good;
     if (!fit_hidden_mass(w, h, io_model))
@@ -623,36 +650,6 @@ static void name_runs(const struct diagnosis_request *request, struct diagnosis 
                                  request->fit[i].path ? request->fit[i].path : "run");
 }
 
-static void add_gain_tie(struct diagnosis *d, size_t model_offset, const char *next)
-{
-    for (int e = 0; sim_effects[e] && d->tie_count < diagnosis_ties_max; e++) {
-        if (sim_effects[e]->parameters[0].model_offset != model_offset || sim_effects[e]->parameter_count != 1)
-            continue;
-        struct diagnosis_tie *tie = &d->ties[d->tie_count++];
-        tie->effects[0] = e;
-        tie->effects[1] = diagnosis_gain;
-        snprintf(tie->next, sizeof tie->next, "%s", next);
-    }
-}
-
-/// What a free gain takes the place of.
-static void list_gain_ties(struct diagnosis *d)
-{
-    if (!d->input_unit)
-        return;
-    add_gain_tie(d, offsetof(struct sim_model, load_inertia_kgm2),
-                 "weigh the load, or measure the torque that a known current makes, and give it with --map");
-    if (strcmp(d->input_unit, "V") == 0)
-        add_gain_tie(d, offsetof(struct sim_model, viscous_friction_Nms_per_rad),
-                     "record the current as well: what the motor's own voltage takes at speed looks like viscous "
-                     "friction");
-    if (d->model_given)
-        oddities_add(&d->oddities,
-                     "The input is in %s; 1 %s makes %.4g +- %.2g %s, if the model's inertia is right. All torques and "
-                     "frictions are wrong by as much as that is.",
-                     d->input_unit, d->input_unit, d->input_gain, d->input_gain_deviation, d->linear ? "N" : "Nm");
-}
-
 /// Without periods the noise is what a smooth black box leaves of the residual, and what that cannot follow passes for
 /// noise. The spectrum above the excitation is a second opinion: an error far above it is not explained.
 static bool refuse_distance(const struct work *w, const struct diagnosis *d, struct judgement *io_judgement)
@@ -730,7 +727,7 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     if (h->inertia_free || !judgement.unexplained) {
         d->tie_count = judge_ties(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, d->ties, diagnosis_ties_max);
     }
-    list_gain_ties(d);
+    gain_tie_list(d);
     return validate_curves(&w->validate_data, d, &d->curves);
 }
 

@@ -6,7 +6,7 @@
 
 enum { iterations = 10 };
 
-static bool is_hidden(int effect)
+bool hidden_mass_is(int effect)
 {
     return sim_effects[effect]->engage || sim_effects[effect]->attach;
 }
@@ -40,7 +40,7 @@ static bool is_of_structure(const struct coordinate *c)
     static const size_t fields[] = {
         offsetof(struct sim_model, motor_inertia_kgm2), offsetof(struct sim_model, load_inertia_kgm2),
         offsetof(struct sim_model, belt_stiffness_Nm_per_rad), offsetof(struct sim_model, belt_damping_Nms_per_rad)};
-    if (c->effect >= 0 && is_hidden(c->effect))
+    if (c->effect >= 0 && hidden_mass_is(c->effect))
         return true;
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
         if (c->model_offset == fields[i])
@@ -72,7 +72,7 @@ bool hidden_mass_holds(const struct hypothesis *hypothesis, int effect)
 {
     for (size_t i = 0; i < hypothesis->count; i++) {
         const struct coordinate *c = &hypothesis->coordinates[i];
-        if (c->effect == effect && is_hidden(effect) && c->lower == c->upper)
+        if (c->effect == effect && hidden_mass_is(effect) && c->lower == c->upper)
             return true;
     }
     return false;

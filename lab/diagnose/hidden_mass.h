@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /// Fits of structures that the given model does not have, with masses that nobody measured. The measured motion of the
 /// motor shakes such a mass, its noise too: how noisy a residual is depends on the parameters, and weights that stay
-/// what they were pull the fit to where there is less noise, a third off and more. So the weights follow the parameters.
+/// what they were pull the fit to where there is less noise, a third off and more. So the weights follow the
+/// parameters.
 /// Equation:  V(theta) = sum_k e_k(theta)^H C_k(theta)^-1 e_k(theta),  C_k from the scatter of the periods: the sample
 ///            maximum likelihood of errors in variables (Pintelon and Schoukens, System Identification, 2nd ed., 2012)
 #ifndef SERVOSCOPE_DIAGNOSE_HIDDEN_MASS_H
@@ -9,6 +10,9 @@
 
 #include "lab/diagnose/fit.h"
 #include "sim/effect.h"
+
+/// Whether an effect brings a mass that nobody measured.
+bool hidden_mass_is(int effect);
 
 /// Whether a hypothesis names a hidden mass and all runs have periods.
 bool hidden_mass_concerns(const struct fit_data *data, const struct hypothesis *hypothesis);

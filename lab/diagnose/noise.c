@@ -441,9 +441,10 @@ static bool add_clipped(const struct evidence *self, const struct sim_model *mod
     size_t n = r->block.samples, rows = r->all.samples;
     if (!r->periodic || !io_actuator || !predict_limits(model))
         return true;
-    double *each = malloc(2 * (rows + n) * sizeof *each), *mean = each + 2 * rows;
+    double *each = malloc(2 * (rows + n) * sizeof *each);
     if (!each)
         return false;
+    double *mean = each + 2 * rows;
     predict_limited(model, &r->all, false, self->scale_inertia, each, each + rows);
     predict_limited(model, &r->block, true, self->scale_inertia, mean, mean + n);
     for (size_t i = 0; i < n; i++) {

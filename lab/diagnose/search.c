@@ -223,7 +223,7 @@ static bool drop_weakest(const struct fit_data *data, struct hypothesis *io_h, s
     int weakest = -1;
     double least = 0.0, misfit = fmax(fit->cost / (double)data->values, 1.0);
     for (int e = 0; sim_effects[e]; e++) {
-        if (!io_h->named[e])
+        if (!io_h->named[e] || hidden_mass_holds(io_h, e))
             continue;
         double margin = search_evidence(data, io_h, fit, e) / misfit - needed_nats(data, io_h, fit, e);
         if (margin < least) {

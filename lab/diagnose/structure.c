@@ -276,13 +276,12 @@ static void find_line(const struct evidence *e, struct structure *out)
         return;
     char where[160];
     snprintf(where, sizeof where, "a line at %.5g Hz stands out that was not excited", e->tones_hz[0]);
-    // What made it a tone was its evidence already.
     const struct recording *r = e->recording;
     size_t bin = (size_t)(e->tones_hz[0] * (double)r->block.samples / r->rate_hz);
     // What changes slowly or for a moment has lines as well, but says less by them.
     if (out->found && bin + 1 >= out->first_bin && bin <= out->last_bin + 1)
         return;
-    keep(out, &(struct octave){bin, bin + 2}, e->tone_nats, INFINITY, 1.0, where);
+    keep(out, &(struct octave){bin, bin + 2}, e->tone_nats, INFINITY, (double)(r->band * r->periods), where);
 }
 
 bool structure_find(const struct evidence *evidence, const double *contrasts, struct structure *out_structure)

@@ -17,7 +17,8 @@ struct wording_units {
 
 struct wording_units wording_units(const struct diagnosis *self);
 
-/// Puts the unit of the input for that of the torque into a sentence about an effect, where wording_units() does.
+/// Puts the unit of the input for that of the torque into a sentence about an effect, where wording_units() does, and
+/// takes out deviations of 0: a number at the edge of what a fit allows has none.
 void wording_in_units(const struct diagnosis *self, size_t size, char *io_text);
 
 /// An effect's id as words: "load bias".

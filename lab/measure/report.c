@@ -12,6 +12,8 @@
 enum { number_size = 32 };
 /// A first counted period this many times further from the last than the others still holds a transient.
 static const double unsettled_ratio = 2.0;
+/// Fewer late samples than this leave a response as it is, for all that noise lets be seen of it.
+static const double late_share = 0.01;
 /// A measurement that uses more of a limit than this may meet it the next time.
 static const double tight_share = 0.95;
 
@@ -34,15 +36,29 @@ static void add_end_note(struct page *page, const struct run *run, const struct 
     }
 }
 
+void report_add_late_note(struct page *page, uint64_t late, size_t rows)
+{
+    if ((double)late > late_share * (double)rows) {
+        page_add_note(page, page_warning, "Samples came late",
+                      "%llu of %zu: a response made of them is that of uneven samples.", (unsigned long long)late,
+                      rows);
+    }
+}
+
 static void add_lost_note(struct page *page, const struct measure_summary *summary, const struct measure_report *report)
 {
+    uint64_t late = 0;
+    for (size_t i = 0; i < measure_parts; i++) {
+        late += report->late_in_part[i];
+    }
     if (summary->lost > 0) {
         page_add_note(page, page_warning, "Samples were lost",
                       "%zu of %zu; frf leaves out the %zu of %zu counted periods that they lie in.", summary->lost,
                       summary->run->rows, summary->periods_with_lost, summary->run->periods);
     } else {
-        page_add_note(page, page_good, "No sample was lost", "%u came late.", (unsigned)report->counters.samples_late);
+        page_add_note(page, page_good, "No sample was lost", NULL);
     }
+    report_add_late_note(page, late, summary->run->rows);
 }
 
 static void add_limit_note(struct page *page, const struct measure_summary *summary,

@@ -19,6 +19,9 @@ double report_key_number(const struct run *run, const char *key);
 /// A note about the worst SYNC, if the run has one; `rate_hz` of the SYNC.
 void report_add_bus_note(struct page *page, const struct run *run);
 
+/// A note if more than one sample in a hundred came late.
+void report_add_late_note(struct page *page, uint64_t late, size_t rows);
+
 /// The section on bus timing.
 void report_add_bus(struct page *page, const struct run *run);
 

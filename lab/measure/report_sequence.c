@@ -91,11 +91,12 @@ static bool make_columns(const struct measure_page_sequence *sequence, struct co
 
 static void add_notes(struct page *page, const struct measure_page_sequence *sequence)
 {
-    size_t lost = 0;
+    size_t lost = 0, rows = 0;
     uint64_t late = 0;
     for (size_t i = 0; i < sequence->count; i++) {
         lost += sequence->segments[i].lost;
         late += sequence->segments[i].late;
+        rows += sequence->segments[i].rows;
     }
     if (sequence->stopped_by) {
         page_add_note(page, page_bad, "Stopped early", "%s. %zu of %zu segments of %s are shown.", sequence->stopped_by,
@@ -105,6 +106,7 @@ static void add_notes(struct page *page, const struct measure_page_sequence *seq
     }
     page_add_note(page, lost > 0 ? page_warning : page_good, lost > 0 ? "Samples were lost" : "No sample was lost",
                   "%zu lost, %llu late.", lost, (unsigned long long)late);
+    report_add_late_note(page, late, rows);
     if (sequence->keys) {
         report_add_bus_note(page, sequence->keys);
     }

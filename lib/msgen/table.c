@@ -180,7 +180,7 @@ static int64_t get_travel(const uint8_t *bytes)
 {
     uint64_t bits = core_get_u32(bytes + offset_travel) | (uint64_t)core_get_u32(bytes + offset_travel + 4u) << 32;
     static const uint64_t sign = (uint64_t)1 << 63;
-    return bits < sign ? (int64_t)bits : (int64_t)(bits - sign) + INT64_MIN;
+    return bits < sign ? (int64_t)bits : -(int64_t)~bits - 1;
 }
 
 static enum core_status check_envelope(const uint8_t *bytes, size_t size, uint32_t *out_offset)

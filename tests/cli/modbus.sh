@@ -70,7 +70,7 @@ fi
 status=0
 "$SERVOSCOPE" measure --drive "modbus-tcp:$place" "${run[@]}" --out x.csv >said2 2>err2 || status=$?
 [ "$status" -eq 1 ] || fail "a second commander: status $status"
-grep -q 'exception 06' err2 || fail "$(cat err2)"
+grep -q 'exception 06 (another client commands)' err2 || fail "$(cat err2)"
 wait "$job" || fail "measure over TCP: $(cat err)"
 grep -q '^tcp.csv: response of 60 lines (60 valid) from 10 periods of 500 samples at 2000 Hz, measured in the drive' said ||
     fail "$(cat said)"
@@ -162,8 +162,8 @@ wait "$drive" || fail "drive: $(cat served-err)"
 
 # Wrong usage.
 refuse 2 "expected ?slave=N" --drive "modbus-tcp:127.0.0.1:1502?slave=300" "${run[@]}" --out x.csv
-refuse 1 "expected HOST:PORT" --drive "modbus-tcp:127.0.0.1" "${run[@]}" --out x.csv
-refuse 1 "expected DEVICE:BAUD" --drive "modbus-rtu:/dev/null" "${run[@]}" --out x.csv
+refuse 2 "expected HOST:PORT" --drive "modbus-tcp:127.0.0.1" "${run[@]}" --out x.csv
+refuse 2 "expected DEVICE:BAUD" --drive "modbus-rtu:/dev/null" "${run[@]}" --out x.csv
 subcommand=drive
 refuse 2 "expected tcp:HOST:PORT or rtu:DEVICE:BAUD" --model model.json --modbus udp:127.0.0.1:1502
 refuse 1 "expected DEVICE:BAUD" --model model.json --modbus rtu:/dev/null:12345

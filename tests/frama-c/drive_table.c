@@ -29,6 +29,23 @@ static void open(uint8_t *bytes, uint32_t size)
     }
 }
 
+static void open_version(uint8_t *bytes, uint32_t size, uint8_t low, uint8_t high)
+{
+    bytes[offset_version] = low;
+    bytes[offset_version + 1] = high;
+    open(bytes, size);
+}
+
+/* Any number from `least`, at most 255, in four cases: Eva keeps bytes, so of a number put into them only what each
+ * byte is by itself. */
+static void put_at_least(uint8_t *field, uint32_t least, uint32_t high_byte)
+{
+    for (uint32_t i = 0; i < 4; ++i) {
+        field[i] = high_byte == 0 ? 0 : any_u8();
+    }
+    field[high_byte] = (uint8_t)any_between(high_byte == 0 ? least : 1, UINT8_MAX);
+}
+
 static void open_as(uint32_t size, uint8_t channels, uint8_t format, uint32_t samples, uint32_t bin_count)
 {
     uint8_t *bytes = memory + bytes_max - size;
@@ -41,6 +58,7 @@ static void open_as(uint32_t size, uint8_t channels, uint8_t format, uint32_t sa
 
 static void open_all(uint32_t size)
 {
+    uint8_t *bytes = memory + bytes_max - size;
     open_as(size, 0, any_u8(), any_u32(), any_u32());
     open_as(size, (uint8_t)any_between(msgen_channels_max + 1, UINT8_MAX), any_u8(), any_u32(), any_u32());
     open_as(size, any_u8(), 0, any_u32(), any_u32());
@@ -51,11 +69,17 @@ static void open_all(uint32_t size)
             uint32_t too_many = (size - msgen_header_bytes - 4u) / frame_bytes + 1u;
             too_many = too_many > 4u ? too_many : 4u;
             open_as(size, channels, format, any_between(0, 3), any_u32());
-            open_as(size, channels, format, any_between(too_many, UINT32_MAX), any_u32());
+            for (uint32_t high_byte = 0; high_byte < 4; ++high_byte) {
+                put_at_least(bytes + offset_samples, too_many, high_byte);
+                open(bytes, size);
+            }
             for (uint32_t samples = 4; samples < too_many; ++samples) {
                 uint32_t bins_max = (samples - 1u) / 2u;
                 open_as(size, channels, format, samples, 0);
-                open_as(size, channels, format, samples, any_between(bins_max + 1u, UINT32_MAX));
+                for (uint32_t high_byte = 0; high_byte < 4; ++high_byte) {
+                    put_at_least(bytes + offset_bin_count, bins_max + 1u, high_byte);
+                    open(bytes, size);
+                }
                 for (uint32_t bin_count = 1; bin_count <= bins_max; ++bin_count) {
                     open_as(size, channels, format, samples, bin_count);
                 }
@@ -77,20 +101,20 @@ int main(void)
         forget();
         open(memory + bytes_max - size, size);
     }
-    static const uint32_t sizes[] = {56, 57, 60, 63, 64, 67, least_bytes, 70, 72, 73, bytes_max};
+    static const uint32_t sizes[] = {56, 60, 63, 64, 67, least_bytes, 70, 72, bytes_max};
     for (uint32_t i = 0; i < sizeof sizes / sizeof *sizes; ++i) {
-        uint8_t *version = memory + bytes_max - sizes[i] + offset_version;
+        uint8_t *bytes = memory + bytes_max - sizes[i];
         forget();
-        core_put_u16(version, 0);
-        open(memory + bytes_max - sizes[i], sizes[i]);
-        core_put_u16(version, (uint16_t)any_between(msgen_table_version_travel + 1, UINT16_MAX));
-        open(memory + bytes_max - sizes[i], sizes[i]);
-        for (uint16_t v = msgen_table_version; v <= msgen_table_version_travel; ++v) {
+        open_version(bytes, sizes[i], 0, 0);
+        open_version(bytes, sizes[i], (uint8_t)any_between(msgen_table_version_travel + 1, UINT8_MAX), 0);
+        open_version(bytes, sizes[i], any_u8(), (uint8_t)any_between(1, UINT8_MAX));
+        for (uint8_t v = msgen_table_version; v <= msgen_table_version_travel; ++v) {
             forget();
-            core_put_u16(version, v);
             if (sizes[i] < least_bytes) {
-                open(memory + bytes_max - sizes[i], sizes[i]);
-            } else {
+                open_version(bytes, sizes[i], v, 0);
+            } else if (sizes[i] < bytes_max || v == msgen_table_version_travel) {
+                bytes[offset_version] = v;
+                bytes[offset_version + 1] = 0;
                 open_all(sizes[i]);
             }
         }

@@ -217,6 +217,13 @@ static void test_diagnosis_report_gain_counts_above_the_noise_floor(void)
     TEST_ASSERT_TRUE(isnan(wording_removed_share(&diagnosis)));
 }
 
+static void test_diagnosis_report_a_number_at_the_edge_of_its_range_has_no_deviation(void)
+{
+    char text[wording_size] = "A mass of 3 +- 0 kg at 12 +- 0.5 Hz and 4 +- 0";
+    wording_in_units(&diagnosis, sizeof text, text);
+    TEST_ASSERT_EQUAL_STRING("A mass of 3 kg at 12 +- 0.5 Hz and 4", text);
+}
+
 int main(void)
 {
     scratch_open();
@@ -232,6 +239,7 @@ int main(void)
     RUN_TEST(test_diagnosis_report_friction_scatter_is_that_of_the_points);
     RUN_TEST(test_diagnosis_report_estimates_have_the_digits_of_their_deviation);
     RUN_TEST(test_diagnosis_report_gain_counts_above_the_noise_floor);
+    RUN_TEST(test_diagnosis_report_a_number_at_the_edge_of_its_range_has_no_deviation);
     int failures = UNITY_END();
     scratch_close();
     return failures;

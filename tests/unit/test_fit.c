@@ -2,6 +2,7 @@
 /// Fits to runs of the simulated drive whose truth and noise are known.
 #include "lab/diagnose/fit.h"
 
+#include "lab/diagnose/hidden_mass.h"
 #include "lab/diagnose/repeat.h"
 #include "lab/numeric/statistics.h"
 #include "sim/belt_drive.h"
@@ -253,7 +254,7 @@ static void test_repeat_adds_by_how_much_other_data_give_another_number(void)
     int effect = name("viscous_friction", 0.002);
     TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 10));
     struct repeat repeat;
-    TEST_ASSERT_TRUE(repeat_compare(&data, &hypothesis, &fit, &data, &repeat));
+    TEST_ASSERT_TRUE(repeat_compare(&data, &hypothesis, &fit, &data, &evidence, &repeat));
     TEST_ASSERT_EQUAL_DOUBLE(0.0, repeat.variance[effect][0]); // the same data
     // A value that is fifty deviations from what the other data say, both deviations alike.
     double value, deviation;
@@ -261,8 +262,42 @@ static void test_repeat_adds_by_how_much_other_data_give_another_number(void)
     for (size_t i = 0; i < hypothesis.count; i++)
         if (hypothesis.coordinates[i].effect == effect) // on a linear scale
             hypothesis.x[i] = (value + 50.0 * deviation) / hypothesis.coordinates[i].unit;
-    TEST_ASSERT_TRUE(repeat_compare(&data, &hypothesis, &fit, &data, &repeat));
+    TEST_ASSERT_TRUE(repeat_compare(&data, &hypothesis, &fit, &data, &evidence, &repeat));
     TEST_ASSERT_DOUBLE_WITHIN(0.05 * 50.0 * deviation, 50.0 * deviation, sqrt(repeat.variance[effect][0]));
+}
+
+/// The load is hidden behind a belt that the given model does not have.
+static void test_fit_of_a_hidden_mass_ends_at_the_truth_when_the_noise_follows(void)
+{
+    const double most_share = 0.1; // of the stiffness: five deviations of these data
+    truth.structure = sim_structure_two_mass;
+    truth.motor_inertia_kgm2 = 0.002;
+    truth.load_inertia_kgm2 = 0.003;
+    truth.belt_stiffness_Nm_per_rad = 400.0;
+    truth.belt_damping_Nms_per_rad = 0.05;
+    given = truth;
+    given.structure = sim_structure_rigid;
+    record(10);
+    int effect = sim_effect_find("belt_elasticity");
+    double values[sim_effect_parameters_max] = {500.0, 0.05}, deviations[sim_effect_parameters_max] = {0.0};
+    TEST_ASSERT_TRUE(effect >= 0);
+    hypothesis_init(&hypothesis, &given, false, true);
+    TEST_ASSERT_FALSE(hidden_mass_concerns(&data, &hypothesis));
+    hypothesis_name(&hypothesis, effect, values);
+    TEST_ASSERT_TRUE(hidden_mass_concerns(&data, &hypothesis));
+    TEST_ASSERT_TRUE(hidden_mass_fit(&data, &evidence, &fit, &hypothesis));
+    hypothesis_parameters(&hypothesis, effect, fit.covariance, values, deviations);
+    TEST_ASSERT_DOUBLE_WITHIN(most_share * 400.0, 400.0, values[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(5.0 * deviations[0], 400.0, values[0]);
+    // What is held stays, and is free again afterwards.
+    struct hypothesis free_again;
+    double x = hypothesis.x[0];
+    hidden_mass_hold(&hypothesis, &free_again);
+    TEST_ASSERT_TRUE(hidden_mass_holds(&hypothesis, effect));
+    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 3));
+    hidden_mass_release(&free_again, &hypothesis);
+    TEST_ASSERT_FALSE(hidden_mass_holds(&hypothesis, effect));
+    TEST_ASSERT_EQUAL_DOUBLE(x, hypothesis.x[0]);
 }
 
 int main(void)
@@ -275,5 +310,6 @@ int main(void)
     RUN_TEST(test_fit_step_with_borrowed_derivatives_is_the_first_step_of_a_fit);
     RUN_TEST(test_fit_deviations_are_the_scatter_over_fresh_noise);
     RUN_TEST(test_repeat_adds_by_how_much_other_data_give_another_number);
+    RUN_TEST(test_fit_of_a_hidden_mass_ends_at_the_truth_when_the_noise_follows);
     return UNITY_END();
 }

@@ -25,6 +25,7 @@ struct fake_drive {
     size_t lost_from; ///< first and number of exchanges that are lost
     size_t lost_count;
     size_t interrupt_at; ///< exchange during which the user presses Ctrl-C
+    size_t late_at;      ///< this exchange is late, and every tenth after it; 0: none
     size_t nan_at;
     size_t nan_reference_at;
     enum drive_status open_status, arm_status, stop_status;
@@ -67,6 +68,7 @@ static enum drive_status fake_exchange(void *self, const struct drive_setpoint *
         fake.failed = true;
         return drive_err_fault;
     }
+    fake.counters.samples_late += fake.late_at > 0 && number >= fake.late_at && (number - fake.late_at) % 10 == 0;
     if (number == fake.interrupt_at) {
         stop_flag = 1;
     }
@@ -609,6 +611,23 @@ static void test_measure_approach_of_a_table_that_travels_sets_off_with_it(void)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "which has room for 2 periods"), error.message);
 }
 
+static void test_measure_notes_when_samples_came_late_but_not_those_of_the_fades(void)
+{
+    enum { arm = 1, first_late_row = -10 };
+    const struct measure_plan plan = make_plan();
+    fake.late_at = arm + fade + 1 + first_late_row;
+    TEST_ASSERT_EQUAL_INT(0, measure(&plan));
+    uint32_t late = 0;
+    for (size_t i = 0; i < measure_parts; i++) {
+        late += report.late_in_part[i];
+    }
+    TEST_ASSERT_EQUAL_UINT32((rows + 9) / 10, late);
+    for (size_t row = 0; row < rows; row += 10) {
+        TEST_ASSERT_EQUAL_UINT32(1, report.late_in_part[measure_part_of(row, rows)]);
+    }
+    TEST_ASSERT_TRUE(report.counters.samples_late > late);
+}
+
 int main(void)
 {
     scratch_open();
@@ -632,6 +651,7 @@ int main(void)
     RUN_TEST(test_measure_approach_is_guarded);
     RUN_TEST(test_measure_without_fade_in_has_nothing_to_approach_in_torque_mode);
     RUN_TEST(test_measure_approach_of_a_table_that_travels_sets_off_with_it);
+    RUN_TEST(test_measure_notes_when_samples_came_late_but_not_those_of_the_fades);
     int failures = UNITY_END();
     scratch_close();
     return failures;

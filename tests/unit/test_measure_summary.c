@@ -208,6 +208,10 @@ static void test_page_says_what_is_wrong_and_only_then(void)
     TEST_ASSERT_TRUE(page_holds(&report, "No sample was lost"));
     TEST_ASSERT_TRUE(page_holds(&report, "Not settled"));
     TEST_ASSERT_FALSE(page_holds(&report, "SYNC is"));
+    report.late_in_part[3] = 2; // of 207
+    TEST_ASSERT_FALSE(page_holds(&report, "Samples came late"));
+    report.late_in_part[4] = 1;
+    TEST_ASSERT_TRUE(page_holds(&report, "Samples came late"));
     TEST_ASSERT_TRUE(run_set_key(&run, "real_time", "SCHED_FIFO"));
     TEST_ASSERT_TRUE(run_set_key(&run, "sync_jitter_us", "mean 10.0, std 5.0, p99 50, max 99"));
     TEST_ASSERT_TRUE(page_holds(&report, "SYNC is even"));

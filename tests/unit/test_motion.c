@@ -221,6 +221,14 @@ static void spoil_position(double amplitude)
         position[i] += amplitude * cos(20.0 * true_position[i]);
 }
 
+static void test_motion_keeps_a_right_speed_column_beside_a_noisy_position(void)
+{
+    add_noise(3e-4, 0.0); // the derivative has a twentieth more power than the speed: plainly regressed, 0.95
+    TEST_ASSERT_TRUE(motion_estimate(rows, rate_hz, position, velocity, period, &out, text, sizeof text));
+    TEST_ASSERT_NULL_MESSAGE(strstr(text, "left out"), text);
+    TEST_ASSERT_NOT_NULL(out.kinematics);
+}
+
 static void test_motion_takes_the_speed_column_alone_where_a_position_is_wrong_by_position(void)
 {
     add_noise(1e-6, 1e-3);
@@ -269,6 +277,7 @@ int main(void)
     RUN_TEST(test_motion_names_the_low_pass_that_a_speed_column_went_through);
     RUN_TEST(test_motion_of_a_position_that_travels_has_no_jump_at_the_end);
     RUN_TEST(test_motion_keeps_a_speed_column_within_the_tolerances);
+    RUN_TEST(test_motion_keeps_a_right_speed_column_beside_a_noisy_position);
     RUN_TEST(test_motion_takes_the_speed_column_alone_where_a_position_is_wrong_by_position);
     RUN_TEST(test_motion_keeps_a_speed_column_whose_gain_errs_both_ways_over_the_travel);
     RUN_TEST(test_motion_of_one_column_has_no_kinematics);

@@ -87,6 +87,17 @@ static void test_report_where_nothing_moves_has_no_places(void)
     TEST_ASSERT_EQUAL_UINT(0, report_shares_find(&curves, false, shares));
 }
 
+static void test_report_where_a_turn_at_constant_speed_has_no_shares_by_speed_or_direction(void)
+{
+    for (size_t n = 0; n < rows; n++) {
+        position[n] = two_pi * (double)n / rows;
+        velocity[n] = two_pi;
+    }
+    TEST_ASSERT_EQUAL_UINT(6, report_shares_find(&curves, false, shares));
+    for (size_t i = 0; i < 6; i++)
+        TEST_ASSERT_NULL_MESSAGE(strstr(shares[i].what, "rad/s"), shares[i].what);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -94,5 +105,6 @@ int main(void)
     RUN_TEST(test_report_where_an_error_of_one_direction_lies_there);
     RUN_TEST(test_report_where_an_error_of_one_place_lies_there);
     RUN_TEST(test_report_where_nothing_moves_has_no_places);
+    RUN_TEST(test_report_where_a_turn_at_constant_speed_has_no_shares_by_speed_or_direction);
     return UNITY_END();
 }

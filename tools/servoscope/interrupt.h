@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// Ctrl-C, a polite kill and a closed terminal as a request that a loop can ask for, and a line on the terminal while it works.
+/// Ctrl-C, a polite kill and a closed terminal as a request that a loop can ask for, and a line on the terminal while
+/// it works.
 #ifndef SERVOSCOPE_TOOLS_INTERRUPT_H
 #define SERVOSCOPE_TOOLS_INTERRUPT_H
 
