@@ -577,6 +577,26 @@ static void describe_cause(const struct work *w, const struct diagnosis *d, cons
     wording_in_units(d, sizeof out->says, out->says);
 }
 
+/// What is nowhere larger than twice its own deviation is no claim, however much of the error it takes.
+static void refuse_vague(const struct work *w, const struct diagnosis *d, const struct hypothesis *h,
+                         struct judgement *io_judgement)
+{
+    for (int e = 0; sim_effects[e]; e++) {
+        struct diagnosis_cause cause;
+        if (!h->named[e] || !io_judgement->stands[e])
+            continue;
+        describe_cause(w, d, h, e, &cause);
+        if (!judge_is_vague(sim_effects[e], cause.values, cause.deviations, cause.nominal))
+            continue;
+        io_judgement->stands[e] = false;
+        io_judgement->count--;
+        if (!io_judgement->unexplained)
+            snprintf(io_judgement->where, sizeof io_judgement->where,
+                     "%s takes part of it, of a size that is not known", sim_effects[e]->id);
+        io_judgement->unexplained = true;
+    }
+}
+
 static int stronger(const void *a, const void *b)
 {
     double x = ((const struct diagnosis_cause *)a)->evidence, y = ((const struct diagnosis_cause *)b)->evidence;
@@ -642,30 +662,6 @@ static void list_deviations(const struct work *w, struct diagnosis *d, const str
     }
 }
 
-static void name_runs(const struct diagnosis_request *request, struct diagnosis *d)
-{
-    size_t used = 0;
-    for (size_t i = 0; i < request->fit_count && used < sizeof d->runs - 1; i++)
-        used += (size_t)snprintf(d->runs + used, sizeof d->runs - used, "%s%s", i > 0 ? ", " : "",
-                                 request->fit[i].path ? request->fit[i].path : "run");
-}
-
-/// Without periods the noise is what a smooth black box leaves of the residual, and what that cannot follow passes for
-/// noise. The spectrum above the excitation is a second opinion: an error far above it is not explained.
-static bool refuse_distance(const struct work *w, const struct diagnosis *d, struct judgement *io_judgement)
-{
-    const double far = 4.0, large = 0.1;
-    double error = d->extended.validation_nrmse;
-    if (io_judgement->unexplained || w->recordings[w->fit_count].periodic || !(error > large) ||
-        !(error > far * d->noise_floor_nrmse))
-        return false;
-    io_judgement->unexplained = true;
-    snprintf(io_judgement->where, sizeof io_judgement->where,
-             "on unseen data the error is %.2g times what the noise above the excited band would make",
-             error / d->noise_floor_nrmse);
-    return true;
-}
-
 /// What a black box that learned on the fit runs leaves of the validation runs; NaN if memory is short.
 static double ceiling_rms(const struct work *w, const struct sim_model *extended)
 {
@@ -677,13 +673,6 @@ static double ceiling_rms(const struct work *w, const struct sim_model *extended
     }
     free(left);
     return rms;
-}
-
-/// Share of the given model's squared excess over one (whitened) or over the noise floor that stays.
-static double share_left(double given, double left, double floor)
-{
-    double before = given * given - floor * floor, after = left * left - floor * floor;
-    return fmin(fmax(after / fmax(before, 1e-12), 0.0), 1.0);
 }
 
 static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesis *h)
@@ -711,7 +700,9 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     if (!repeat_compare(&w->fit_data, h, &w->fit, &w->validate_data, w->evidence + w->fit_count, &w->repeat) ||
         !estimate_validation_noise(w, h, &d->extended_model)) // which that may have moved
         return false;
-    bool distant = refuse_distance(w, d, &judgement);
+    bool distant = !w->recordings[w->fit_count].periodic &&
+                   judge_distance(d->extended.validation_nrmse, d->noise_floor_nrmse, &judgement);
+    refuse_vague(w, d, h, &judgement);
     d->verdict = judgement.unexplained                                         ? diagnosis_unexplained
                  : judgement.count > 0 || w->recordings[0].finding.effect >= 0 ? diagnosis_explained
                                                                                : diagnosis_no_discrepancy;
@@ -720,9 +711,9 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     list_deviations(w, d, h);
     if (judgement.unexplained) {
         snprintf(d->where, sizeof d->where, "%s", judgement.where);
-        d->unexplained_share =
-            distant ? share_left(d->nominal.validation_nrmse, d->extended.validation_nrmse, d->noise_floor_nrmse)
-                    : share_left(d->nominal.mean_rms, d->extended.mean_rms, 1.0);
+        d->unexplained_share = distant ? validate_share_left(d->nominal.validation_nrmse, d->extended.validation_nrmse,
+                                                             d->noise_floor_nrmse)
+                                       : validate_share_left(d->nominal.mean_rms, d->extended.mean_rms, 1.0);
     }
     if (h->inertia_free || !judgement.unexplained) {
         d->tie_count = judge_ties(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, d->ties, diagnosis_ties_max);
@@ -752,7 +743,7 @@ int diagnosis_run(const struct diagnosis_request *request, struct diagnosis *out
     if (status == 0)
         status = prepare_evidence(&w, d, out_error);
     if (status == 0) {
-        name_runs(request, d);
+        wording_runs(request, d->runs);
         snprintf(d->motion_from, sizeof d->motion_from, "%s", w.recordings[0].motion_from);
         tell(request, "refitting the given model");
         if (!find_causes(request, &w, d, &h) ||

@@ -415,3 +415,41 @@ size_t judge_ties(const struct fit_data *data, const struct sim_coverage *covera
     fit_free(&without_fit);
     return count;
 }
+
+bool judge_is_vague(const struct sim_effect *effect, const double *values, const double *deviations,
+                    const double *nominal)
+{
+    const double certain = 2.0;
+    bool sinusoid = false;
+    for (size_t i = 0; i < effect->parameter_count; i++)
+        sinusoid = sinusoid || effect->parameters[i].kind == sim_parameter_amplitude;
+    for (size_t i = 0; i < effect->parameter_count; i++) {
+        const enum sim_parameter_kind kind = effect->parameters[i].kind;
+        if (kind == sim_parameter_phase || (sinusoid && kind != sim_parameter_amplitude))
+            continue;
+        if (!(fabs(values[i] - nominal[i]) < certain * deviations[i]))
+            return false;
+    }
+    return true;
+}
+
+bool judge_distance(double error, double noise_floor, struct judgement *io_judgement)
+{
+    const double far = 4.0, large = 0.1;
+    const bool blind = noise_floor > 1.0;
+    if (blind) {
+        memset(io_judgement->stands, 0, sizeof io_judgement->stands);
+        io_judgement->count = 0;
+        snprintf(io_judgement->where, sizeof io_judgement->where,
+                 "what passes for noise is %.3g times the measured torque: the motion is recorded too coarsely",
+                 noise_floor);
+    } else if (!io_judgement->unexplained && error > large && error > far * noise_floor) {
+        snprintf(io_judgement->where, sizeof io_judgement->where,
+                 "on unseen data the error is %.2g times what the noise above the excited band would make",
+                 error / noise_floor);
+    } else {
+        return false;
+    }
+    io_judgement->unexplained = true;
+    return true;
+}

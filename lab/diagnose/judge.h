@@ -35,6 +35,17 @@ struct judge_validation {
 bool judge(const struct fit_data *data, const struct sim_coverage *coverage, const struct hypothesis *hypothesis,
            const struct fit *fit, const struct judge_validation *validation, struct judgement *out_judgement);
 
+/// A second opinion on runs without periods, whose noise is what a smooth black box leaves of the residual: what that
+/// cannot follow passes for noise. An error far above what the spectrum above the excitation would make is not
+/// explained; and where noise is larger than all that was measured, no name stands. Returns whether it changed the
+/// judgement.
+bool judge_distance(double error, double noise_floor, struct judgement *io_judgement);
+
+/// Whether an effect's size is not known: every parameter but phases, of a sinusoid its amplitude alone, lies within
+/// two of its deviations of nothing, or of the given model's value.
+bool judge_is_vague(const struct sim_effect *effect, const double *values, const double *deviations,
+                    const double *nominal);
+
 /// Structure over time in what a model leaves of runs, whose noise must have been estimated.
 /// Errors: false if memory is short
 bool judge_structure(const struct fit_data *data, const struct sim_model *model, struct structure *out_structure);

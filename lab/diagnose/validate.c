@@ -272,3 +272,9 @@ bool validate_curves(const struct fit_data *data, const struct diagnosis *models
         friction_curves(r, models, c);
     return good;
 }
+
+double validate_share_left(double given, double left, double floor)
+{
+    double before = given * given - floor * floor, after = left * left - floor * floor;
+    return fmin(fmax(after / fmax(before, 1e-12), 0.0), 1.0);
+}

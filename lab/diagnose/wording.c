@@ -301,3 +301,11 @@ size_t wording_next(const struct diagnosis *self, size_t max, char (*out_texts)[
     }
     return count;
 }
+
+void wording_runs(const struct diagnosis_request *request, char out_text[wording_runs_size])
+{
+    size_t used = 0;
+    for (size_t i = 0; i < request->fit_count && used < wording_runs_size - 1; i++)
+        used += (size_t)snprintf(out_text + used, wording_runs_size - used, "%s%s", i > 0 ? ", " : "",
+                                 request->fit[i].path ? request->fit[i].path : "run");
+}

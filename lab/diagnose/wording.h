@@ -45,6 +45,11 @@ const char *wording_refit(const struct diagnosis *self);
 /// What to measure to test for an effect that was not tested for: a clause after "measure".
 const char *wording_measure(const struct diagnosis_untestable *untestable);
 
+enum { wording_runs_size = 512 };
+
+/// The fitted runs by their files, with commas.
+void wording_runs(const struct diagnosis_request *request, char out_text[wording_runs_size]);
+
 /// Whether the extended model is more than the refitted one: anything was found, claimed or not.
 bool wording_is_extended(const struct diagnosis *self);
 
