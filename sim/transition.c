@@ -40,6 +40,12 @@ static void exponential(struct square *io_a)
     enum { terms = 11 }; // 0.25^12 / 12! < 2e-16
     int halvings = 0;
     double size = norm(io_a);
+    if (!isfinite(size)) { // a search looks at models beyond all bounds, and has to see that they are no models
+        for (size_t i = 0; i < io_a->n; i++)
+            for (size_t j = 0; j < io_a->n; j++)
+                io_a->a[i][j] = NAN;
+        return;
+    }
     if (size > longest)
         halvings = (int)ceil(log2(size / longest));
     for (size_t i = 0; i < io_a->n; i++)

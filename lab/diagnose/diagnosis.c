@@ -414,8 +414,16 @@ static bool refit_given(struct work *w, struct diagnosis *d, struct hypothesis *
 /// The noise follows the fit: estimated once more for what else is taken from it.
 static bool fit_hidden_mass(struct work *w, struct hypothesis *h, struct sim_model *io_model)
 {
-    if (!hidden_mass_fit(&w->fit_data, w->evidence, &w->fit, h))
-        return false;
+    struct hypothesis without = *h;
+    if (!hidden_mass_fit(&w->fit_data, w->evidence, &w->fit, h)) {
+        // Data of an unknown cause may not determine a mass with noise of its own: then there is none to be named.
+        for (int e = 0; sim_effects[e]; e++)
+            if (without.named[e] && hidden_mass_is(e))
+                hypothesis_unname(&without, e);
+        *h = without;
+        hypothesis_model(h, NULL, io_model);
+        return fit_anew(w, h, io_model);
+    }
     hypothesis_model(h, NULL, io_model);
     return estimate_fit_noise(w, io_model);
 }
