@@ -20,7 +20,7 @@ int door_open(const char *url, const struct sim_model *model, struct door *out_d
         const struct door_scheme *scheme = schemes[i];
         size_t length = strlen(scheme->prefix), used = strlen(forms);
         if (strncmp(url, scheme->prefix, length) == 0) {
-            int status = scheme->open(url + length, model, out_door, out_error);
+            int status = scheme->open(scheme, url + length, model, out_door, out_error);
             out_door->scheme = scheme;
             return status;
         }

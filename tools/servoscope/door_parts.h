@@ -11,11 +11,13 @@
 /// The door to one kind of drive.
 struct door_scheme {
     const char *prefix;                           ///< "can:"
+    const char *bus;                              ///< what can_bus_open wants in front of the address; NULL: no CAN
     const char *form;                             ///< how a whole URL looks, for messages
     const char *asked;                            ///< names that may stand behind its '?', separated by blanks
     long node_default, node_lowest, node_highest; ///< of door_read_query
     /// Makes the door of what follows the prefix. `model` as door_open has it.
-    int (*open)(const char *rest, const struct sim_model *model, struct door *out_door, struct error *out_error);
+    int (*open)(const struct door_scheme *self, const char *rest, const struct sim_model *model, struct door *out_door,
+                struct error *out_error);
     /// NULL: there is nothing to count but what drive->counters has.
     void (*read_statistics)(const struct door *self, struct door_statistics *out_statistics);
     /// Frees what is behind the door; the drive is closed before.

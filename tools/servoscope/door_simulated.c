@@ -57,8 +57,10 @@ static int open_simulator(const struct sim_model *model, struct door *out_door, 
     return error_none;
 }
 
-static int open_model(const char *path, const struct sim_model *model, struct door *out_door, struct error *out_error)
+static int open_model(const struct door_scheme *scheme, const char *path, const struct sim_model *model,
+                      struct door *out_door, struct error *out_error)
 {
+    (void)scheme;
     if (!model && *path == '\0')
         return error_set(out_error, error_usage, "--drive: 'sim:' needs a model file: sim:MODEL.json");
     struct sim_model read;
