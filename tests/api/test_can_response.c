@@ -6,10 +6,9 @@
 #include "lab/estimate/periodic.h"
 #include "lab/measure/measure.h"
 #include "lab/measure/table_bytes.h"
-#include "lab/numeric/statistics.h"
-#include "lab/record/table_file.h"
 #include "ports/bus_watch.h"
 #include "tests/support/can_bench.h"
+#include "tests/support/rigid_table.h"
 #include "tests/support/scratch.h"
 #include "unity.h"
 
@@ -19,7 +18,6 @@
 
 enum { length = 500, lines = 80, settle = 1, periods = 5 };
 
-static const double two_pi = 6.283185307179586;
 static const double inertia_kgm2 = 0.00516;
 static const double cycle_s = 1e-3;
 /// What is promised for an estimated delay.
@@ -33,26 +31,8 @@ static struct error error;
 /// 0.02 Nm on each of the lines 2, 4, .. 160 Hz, and the motion of the inertia under it.
 static void make_table(void)
 {
-    struct table made;
-    struct random random;
-    random_seed(&random, 23);
-    TEST_ASSERT_EQUAL_INT(0, table_alloc(&made, length, 3, lines, &error));
-    TEST_ASSERT_EQUAL_INT(0, table_set_rate(&made, 1.0 / cycle_s, &error));
-    for (uint32_t b = 0; b < lines; b++) {
-        made.bins[b] = 1 + b;
-        double omega = two_pi * (1 + b) / (length * cycle_s), acceleration = 0.02 / inertia_kgm2;
-        double phase = two_pi * random_uniform(&random);
-        for (uint32_t n = 0; n < length; n++) {
-            double angle = omega * n * cycle_s + phase;
-            made.torque[n] += 0.02 * cos(angle);
-            made.velocity[n] += acceleration / omega * sin(angle);
-            made.position[n] -= acceleration / (omega * omega) * cos(angle);
-        }
-    }
-    const char *path = scratch_path("table.mst");
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, table_file_write_mst(path, &made, &error), error.message);
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, table_bytes_read(path, &table, &error), error.message);
-    table_free(&made);
+    const struct rigid_table plan = {1.0 / cycle_s, length, lines, 0.02, inertia_kgm2, 23};
+    rigid_table_make(&plan, &table);
 }
 
 /// An inertia with viscous friction, its delay the only one, and noise on every sensor.

@@ -7,10 +7,9 @@
 #include "lab/estimate/periodic.h"
 #include "lab/measure/measure.h"
 #include "lab/measure/table_bytes.h"
-#include "lab/numeric/statistics.h"
-#include "lab/record/table_file.h"
 #include "sim/node/odrive_node.h"
 #include "tests/support/can_bench.h"
+#include "tests/support/rigid_table.h"
 #include "tests/support/scratch.h"
 
 #include "unity.h"
@@ -91,27 +90,9 @@ static void open_and_arm(enum drive_mode mode)
 
 static void make_table(void)
 {
-    struct table made;
-    struct random random;
-    random_seed(&random, 29);
-    TEST_ASSERT_EQUAL_INT(0, table_alloc(&made, length, 3, lines, &error));
-    TEST_ASSERT_EQUAL_INT(0, table_set_rate(&made, 1000.0, &error));
-    double inertia_kgm2 = model.motor_inertia_kgm2 + model.load_inertia_kgm2;
-    for (uint32_t b = 0; b < lines; b++) {
-        made.bins[b] = 1 + b;
-        double omega = two_pi * (1 + b) * 1000.0 / length, acceleration = 0.03 / inertia_kgm2;
-        double phase = two_pi * random_uniform(&random);
-        for (uint32_t n = 0; n < length; n++) {
-            double angle = omega * n / 1000.0 + phase;
-            made.torque[n] += 0.03 * cos(angle);
-            made.velocity[n] += acceleration / omega * sin(angle);
-            made.position[n] -= acceleration / (omega * omega) * cos(angle);
-        }
-    }
-    const char *path = scratch_path("table.mst");
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, table_file_write_mst(path, &made, &error), error.message);
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, table_bytes_read(path, &table, &error), error.message);
-    table_free(&made);
+    const struct rigid_table plan = {1000.0, length, lines, 0.03, model.motor_inertia_kgm2 + model.load_inertia_kgm2,
+                                     29};
+    rigid_table_make(&plan, &table);
 }
 
 static void measure(const struct drive *door, enum drive_mode mode, struct frf *out_frf)

@@ -5,9 +5,8 @@
 #include "lab/estimate/periodic.h"
 #include "lab/measure/measure.h"
 #include "lab/measure/table_bytes.h"
-#include "lab/numeric/statistics.h"
-#include "lab/record/table_file.h"
 #include "sim/node/direct_drive.h"
+#include "tests/support/rigid_table.h"
 #include "tests/support/scratch.h"
 #include "unity.h"
 
@@ -48,27 +47,8 @@ static void make_model(void)
 /// 0.02 Nm on each of the lines 2, 4, .. 160 Hz, and the motion of the rigid body under it.
 static void make_table(void)
 {
-    struct table made;
-    struct random random;
-    random_seed(&random, 17);
-    TEST_ASSERT_EQUAL_INT(0, table_alloc(&made, length, 3, lines, &error));
-    TEST_ASSERT_EQUAL_INT(0, table_set_rate(&made, 1000.0, &error));
-    for (uint32_t b = 0; b < lines; b++) {
-        made.bins[b] = 1 + b;
-        double omega = two_pi * (1 + b) * 1000.0 / length;
-        double acceleration = 0.02 / inertia_kgm2;
-        double phase = two_pi * random_uniform(&random);
-        for (uint32_t n = 0; n < length; n++) {
-            double angle = omega * n / 1000.0 + phase;
-            made.torque[n] += 0.02 * cos(angle);
-            made.velocity[n] += acceleration / omega * sin(angle);
-            made.position[n] -= acceleration / (omega * omega) * cos(angle);
-        }
-    }
-    const char *path = scratch_path("table.mst");
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, table_file_write_mst(path, &made, &error), error.message);
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, table_bytes_read(path, &table, &error), error.message);
-    table_free(&made);
+    const struct rigid_table plan = {1000.0, length, lines, 0.02, inertia_kgm2, 17};
+    rigid_table_make(&plan, &table);
 }
 
 void setUp(void)

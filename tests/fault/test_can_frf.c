@@ -9,8 +9,8 @@
 #include "lab/estimate/periodic.h"
 #include "lab/measure/measure.h"
 #include "lab/measure/table_bytes.h"
-#include "lab/record/table_file.h"
 #include "tests/support/can_bench.h"
+#include "tests/support/rigid_table.h"
 #include "tests/support/scratch.h"
 #include "unity.h"
 
@@ -38,23 +38,8 @@ static struct error error;
 
 static void make_table(void)
 {
-    struct table made;
-    TEST_ASSERT_EQUAL_INT(0, table_alloc(&made, length, 3, lines, &error));
-    TEST_ASSERT_EQUAL_INT(0, table_set_rate(&made, 1000.0, &error));
-    for (uint32_t b = 0; b < lines; b++) {
-        double omega = two_pi * (1 + b) * 1000.0 / length, acceleration = 0.1 / inertia_kgm2;
-        made.bins[b] = 1 + b;
-        for (uint32_t n = 0; n < length; n++) {
-            double angle = omega * n / 1000.0 + b * b;
-            made.torque[n] += 0.1 * cos(angle);
-            made.velocity[n] += acceleration / omega * sin(angle);
-            made.position[n] -= acceleration / (omega * omega) * cos(angle);
-        }
-    }
-    const char *path = scratch_path("table.mst");
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, table_file_write_mst(path, &made, &error), error.message);
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, table_bytes_read(path, &table, &error), error.message);
-    table_free(&made);
+    const struct rigid_table plan = {1000.0, length, lines, 0.1, inertia_kgm2, 0};
+    rigid_table_make(&plan, &table);
 }
 
 void setUp(void)
