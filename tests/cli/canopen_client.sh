@@ -5,16 +5,11 @@
 set -euo pipefail
 build=$(dirname "$SERVOSCOPE")
 pipe=$build/tests/support/can_pipe
-venv=$build/venv-canopen
 sheet=$SERVOSCOPE_SOURCE/sim/node/servoscope-drive.eds
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
-if ! "$venv/bin/python" -c 'import canopen, can' 2>/dev/null; then
-    { python3 -m venv "$venv" && "$venv/bin/pip" --quiet install canopen==2.4.1 python-can==4.6.1; } >&2 || {
-        echo "skipped: no package index"
-        exit 77
-    }
-fi
+source "$SERVOSCOPE_SOURCE/tests/support/foreign.sh"
+python_with canopen canopen,can canopen==2.4.1 python-can==4.6.1
 "$pipe" eds >"$folder/now.eds"
 if ! cmp "$sheet" "$folder/now.eds"; then
     echo "FAILED: the sheet in the repository is not what the dictionary says; renew it with: $pipe eds >sim/node/servoscope-drive.eds" >&2

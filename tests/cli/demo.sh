@@ -2,16 +2,8 @@
 # SPDX-License-Identifier: MIT
 # servoscope demo from the command line: its files, that it finds what it hid, that the axis kept near its limits, what it
 # refuses. The seeds are fixed; fresh ones are for `./run bench demo`.
-set -euo pipefail
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-cd "$folder"
-failures=0
-
-fail() {
-    echo "FAILED: $*" >&2
-    failures=$((failures + 1))
-}
+subcommand=demo
+source "$SERVOSCOPE_SOURCE/tests/support/cli.sh"
 
 # refuse STATUS PART ARGUMENTS...   the program ends with STATUS, says PART in one line on standard error, prints nothing
 refuse() {

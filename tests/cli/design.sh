@@ -2,16 +2,8 @@
 # SPDX-License-Identifier: MIT
 # servoscope design from the command line: what it writes, what it refuses (exit status and a message with value and
 # expectation), and what is left on the disk then.
-set -euo pipefail
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-cd "$folder"
-failures=0
-
-fail() {
-    echo "FAILED: $*" >&2
-    failures=$((failures + 1))
-}
+subcommand=design
+source "$SERVOSCOPE_SOURCE/tests/support/cli.sh"
 
 # refuse STATUS PART ARGUMENTS...   the program ends with STATUS, says PART on standard error, prints and leaves nothing
 refuse() {

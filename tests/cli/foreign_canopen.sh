@@ -4,17 +4,12 @@
 # environment beside the build.
 # Runs itself inside scripts/with-vcan. Programs with AddressSanitizer do not run there: SERVOSCOPE_OPTIMISED is taken if it is set.
 set -euo pipefail
-venv=$(dirname "$SERVOSCOPE")/venv-canopen
 if [ "${1:-}" != inside ]; then
     if [ ! -e /sys/class/net/vcan0 ] && ! command -v linux.uml >/dev/null; then
         [ -n "${CI:-}" ] || exit 77 # elsewhere nothing is installed for it
     fi
-    if ! "$venv/bin/python" -c 'import canopen, can' 2>/dev/null; then
-        { python3 -m venv "$venv" && "$venv/bin/pip" --quiet install canopen==2.4.1 python-can==4.6.1; } >&2 || {
-        echo "skipped: no package index"
-        exit 77
-    }
-    fi
+    source "$SERVOSCOPE_SOURCE/tests/support/foreign.sh"
+    python_with canopen canopen,can canopen==2.4.1 python-can==4.6.1
     program=${SERVOSCOPE_OPTIMISED:-$SERVOSCOPE}
     exec env SERVOSCOPE="$program" SERVOSCOPE_VENV="$venv" \
         "$SERVOSCOPE_SOURCE/scripts/with-vcan" -t 200 bash "${BASH_SOURCE[0]}" inside

@@ -5,15 +5,9 @@
 # mbpoll reads what the documentation says, gives a command and uploads a table word by word.
 subcommand=drive
 source "$SERVOSCOPE_SOURCE/tests/support/cli.sh"
-venv=$(dirname "$SERVOSCOPE")/venv-modbus
-if ! "$venv/bin/python" -c 'import pymodbus, serial' 2>/dev/null; then
-    { python3 -m venv "$venv" && "$venv/bin/pip" --quiet install pymodbus==3.16.1 pyserial==3.5; } >&2 || {
-        echo "skipped: no package index"
-        exit 77
-    }
-fi
-jobs_of_test=()
-trap 'kill "${jobs_of_test[@]}" 2>/dev/null || true; rm -rf "$folder"' EXIT
+source "$SERVOSCOPE_SOURCE/tests/support/foreign.sh"
+source "$SERVOSCOPE_SOURCE/tests/support/modbus_drive.sh"
+python_with modbus pymodbus,serial pymodbus==3.16.1 pyserial==3.5
 
 "$SERVOSCOPE" design --rate 2000 --period 500 --lines linear:4:240:4 --limit-torque 1 --inertia 0.005 --method newman \
     --out table --quiet
@@ -23,19 +17,6 @@ cat >model.json <<'JSON'
 JSON
 "$SERVOSCOPE" simulate --model model.json --table table.mst --periods 8 --out streamed.csv --quiet
 "$SERVOSCOPE" frf streamed.csv --out streamed-frf.csv --quiet
-
-# serve PLACE: starts the drive there, sets `drive` to its process and `place` to where it listens
-serve() {
-    : >served
-    "$SERVOSCOPE" drive --model model.json --modbus "$1" >served 2>served-err &
-    drive=$!
-    jobs_of_test+=("$drive")
-    for _ in {1..200}; do
-        ! grep -q '^simulated drive on Modbus ' served || break
-        sleep 0.05
-    done
-    place=$(sed -n 's/^simulated drive on Modbus \([^ ,]*\),.*/\1/p' served)
-}
 
 # The gate is 3 sigma on nine lines in ten, which chance breaks less than once in a thousand runs.
 compare() {

@@ -4,8 +4,7 @@
 # the response of the streamed measurement; one client commands; what is refused.
 subcommand=measure
 source "$SERVOSCOPE_SOURCE/tests/support/cli.sh"
-jobs_of_test=()
-trap 'kill "${jobs_of_test[@]}" 2>/dev/null || true; rm -rf "$folder"' EXIT
+source "$SERVOSCOPE_SOURCE/tests/support/modbus_drive.sh"
 
 "$SERVOSCOPE" design --rate 2000 --period 500 --lines linear:4:240:4 --limit-torque 1 --inertia 0.005 --method newman \
     --out table --quiet
@@ -14,20 +13,6 @@ cat >model.json <<'JSON'
  "belt_damping_Nms_per_rad": 0.05, "viscous_friction_Nms_per_rad": 0.01, "coulomb_friction_Nm": 0, "sample_rate_hz": 2000,
  "process_noise_Nm": 0.02, "sensors": {"velocity_noise_rad_per_s": 0.02, "torque_noise_Nm": 0.005}, "seed": 3}
 JSON
-
-# serve PLACE: starts the drive there, sets `drive` to its process and `place` to where it listens
-serve() {
-    : >served
-    "$SERVOSCOPE" drive --model model.json --modbus "$1" >served 2>served-err &
-    drive=$!
-    jobs_of_test+=("$drive")
-    for _ in {1..200}; do
-        ! grep -q '^simulated drive on Modbus ' served || break
-        sleep 0.05
-    done
-    place=$(sed -n 's/^simulated drive on Modbus \([^ ,]*\),.*/\1/p' served)
-    [ -n "$place" ] || fail "the drive does not say where it is: $(cat served served-err)"
-}
 
 # compare FILE: the response against the streamed one. Two estimates of 10 periods differ by more than 2 sigma on about 3 % of
 # the lines; the gate is 3 sigma on nine in ten, which chance breaks less than once in a thousand runs.

@@ -2,16 +2,8 @@
 # SPDX-License-Identifier: MIT
 # servoscope design --separate from the command line: two causes that tie in a diagnosis of the excitation as given are told
 # apart by the one that it makes; causes that are equal by physics; what is refused.
-set -euo pipefail
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-cd "$folder"
-failures=0
-
-fail() {
-    echo "FAILED: $*" >&2
-    failures=$((failures + 1))
-}
+subcommand=design
+source "$SERVOSCOPE_SOURCE/tests/support/cli.sh"
 
 common=(--rate 1000 --period 500 --lines odd:2:60:4 --limit-position 2 --limit-velocity 15 --limit-torque 3 --inertia 0.0051)
 pair=load_bias,asymmetric_friction

@@ -3,13 +3,8 @@
 # python-can's slcan against `servoscope drive`, over TCP and over a pty, in a virtual environment beside the build.
 subcommand=drive
 source "$SERVOSCOPE_SOURCE/tests/support/cli.sh"
-venv=$(dirname "$SERVOSCOPE")/venv-slcan
-if ! "$venv/bin/python" -c 'import can, serial' 2>/dev/null; then
-    { python3 -m venv "$venv" && "$venv/bin/pip" --quiet install python-can==4.6.1 pyserial==3.5; } >&2 || {
-        echo "skipped: no package index"
-        exit 77
-    }
-fi
+source "$SERVOSCOPE_SOURCE/tests/support/foreign.sh"
+python_with slcan can,serial python-can==4.6.1 pyserial==3.5
 echo '{"structure": "rigid", "motor_inertia_kgm2": 0.005, "sample_rate_hz": 1000, "seed": 3}' >model.json
 cat >client.py <<'PYTHON'
 import sys, time, can
