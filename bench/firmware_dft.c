@@ -12,12 +12,13 @@
 #define CHANNELS_MAX 2u
 
 static int32_t coefficients[FRF_BLOCK_TABLE_WORDS(BINS_MAX, 128u, 128u)];
-static int32_t storage[FRF_BLOCK_STORAGE_WORDS(BINS_MAX, CHANNELS_MAX, 1u, 128u, 64u)];
-static int32_t part[FRF_BLOCK_PART_WORDS(CHANNELS_MAX, 2000u, 2u, 128u)];
-static int16_t frames[FRF_BLOCK_FRAME_SAMPLES(CHANNELS_MAX, 128u)];
+static int32_t storage[FRF_BLOCK_STORAGE_WORDS(BINS_MAX, CHANNELS_MAX, 1u, 128u, 64u) +
+                       FRF_BLOCK_SPREAD_WORDS(CHANNELS_MAX, 128u)];
+static int32_t part[FRF_BLOCK_PART_WORDS(CHANNELS_MAX, 2000u, 2u)];
 static union frf_word words[FRF_STORAGE_WORDS(BINS_MAX, CHANNELS_MAX)];
 static int32_t table[FRF_TWIDDLE_WORDS(PERIOD_MAX)];
 static int16_t samples[PERIOD_MAX * CHANNELS_MAX];
+static int32_t samples_i24[PERIOD_MAX];
 static uint32_t bins[BINS_MAX];
 
 struct cost {
@@ -99,8 +100,6 @@ static void run_block(const char *name, uint32_t period, uint32_t bin_count, uin
     uint32_t checksum[2] = {1, 0}, unused;
     config.storage = storage;
     config.storage_words = sizeof storage / sizeof *storage;
-    config.frames = frames;
-    config.frame_samples = sizeof frames / sizeof *frames;
     config.part = part;
     config.part_words = sizeof part / sizeof *part;
     fill(period * channels);
@@ -129,64 +128,120 @@ static void run_block(const char *name, uint32_t period, uint32_t bin_count, uin
     count_block_by_frames(&dft, &unused, &cost.longest_spread);
     print_case(name, channels, &cost, period * bin_count * channels,
                4u * FRF_BLOCK_STORAGE_WORDS(bin_count, channels, 1u, block, terms) +
-                   (repeats > 1 ? 4u * FRF_BLOCK_PART_WORDS(channels, period, repeats, block)
-                                : 2u * FRF_BLOCK_FRAME_SAMPLES(channels, block)),
+                   (repeats > 1 ? 4u * FRF_BLOCK_PART_WORDS(channels, period, repeats) : 0u),
                4u * FRF_BLOCK_TABLE_WORDS(bin_count, block, terms), checksum);
 }
 
-static enum core_status init_exact(struct frf_dft *dft, const struct frf_dft_config *config, uint32_t period,
-                                   bool is_q31)
-{
-    struct frf_twiddles_q15 q15;
-    struct frf_twiddles_q31 q31;
-    enum core_status status;
-    if (is_q31) {
-        status = frf_twiddles_build_q31(table, FRF_TWIDDLE_WORDS(period), period, &q31);
-        return status == core_ok ? frf_dft_init_q31(dft, config, &q31) : status;
+/* The exact DFTs: builds a table in `table` and sets up over it; returns the table's bytes, 0 on error. */
+typedef uint32_t set_up(struct frf_dft *dft, const struct frf_dft_config *config, uint32_t period);
+
+#define FULL(number, word)                                                                                             \
+    static uint32_t full_##number(struct frf_dft *dft, const struct frf_dft_config *config, uint32_t period)           \
+    {                                                                                                                  \
+        struct frf_twiddles_##number twiddles;                                                                         \
+        uint32_t count = FRF_TWIDDLE_WORDS(period);                                                                    \
+        bool done = frf_twiddles_build_##number((word *)(void *)table, count, period, &twiddles) == core_ok &&         \
+                    frf_dft_init_##number(dft, config, &twiddles) == core_ok;                                          \
+        return done ? count * (uint32_t)sizeof(word) : 0;                                                              \
     }
-    status = frf_twiddles_build_q15((int16_t *)(void *)table, FRF_TWIDDLE_WORDS(period), period, &q15);
-    return status == core_ok ? frf_dft_init_q15(dft, config, &q15) : status;
+#define QUARTER(number, word)                                                                                          \
+    static uint32_t quarter_##number(struct frf_dft *dft, const struct frf_dft_config *config, uint32_t period)        \
+    {                                                                                                                  \
+        struct frf_quarter_##number quarter;                                                                           \
+        uint32_t count = FRF_QUARTER_WORDS(period);                                                                    \
+        bool done = frf_quarter_build_##number((word *)(void *)table, count, period, &quarter) == core_ok &&           \
+                    frf_dft_init_quarter_##number(dft, config, &quarter) == core_ok;                                   \
+        return done ? count * (uint32_t)sizeof(word) : 0;                                                              \
+    }
+#define TWO_LEVEL(number, point, turn)                                                                                 \
+    static uint32_t two_level_##number(struct frf_dft *dft, const struct frf_dft_config *config, uint32_t period)      \
+    {                                                                                                                  \
+        struct frf_two_level_##number levels;                                                                          \
+        struct point *coarse = (struct point *)(void *)table;                                                          \
+        uint32_t points = FRF_COARSE_POINTS(period), turns = FRF_FINE_TURNS(period);                                   \
+        struct turn *fine = (struct turn *)(void *)(coarse + points);                                                  \
+        bool done = frf_two_level_build_##number(coarse, points, fine, turns, period, &levels) == core_ok &&           \
+                    frf_dft_init_two_level_##number(dft, config, &levels) == core_ok;                                  \
+        return done ? points * (uint32_t)sizeof(struct point) + turns * (uint32_t)sizeof(struct turn) : 0;             \
+    }
+FULL(q15, int16_t)
+FULL(q23, int32_t)
+FULL(q31, int32_t)
+QUARTER(q15, int16_t)
+QUARTER(q23, int32_t)
+QUARTER(q31, int32_t)
+TWO_LEVEL(q15, frf_point, frf_turn_q15)
+TWO_LEVEL(q23, frf_point, frf_turn)
+TWO_LEVEL(q31, frf_point, frf_turn)
+
+static void add_frames(struct frf_dft *dft, uint32_t first, uint32_t count)
+{
+    if (dft->number == frf_number_q23) {
+        frf_dft_add_i24(dft, samples_i24 + first, count);
+    } else {
+        frf_dft_add_i16(dft, samples + first, count);
+    }
 }
 
-static void run_exact(const char *name, uint32_t period, uint32_t last, uint32_t bin_count, bool is_q31)
+static void add_sums(const struct frf_dft *dft, uint32_t *io_checksum)
+{
+    struct frf_period latched;
+    if (!frf_dft_latest(dft, &latched)) {
+        port_exit(1);
+    }
+    for (uint32_t b = 0; b < dft->bin_count; ++b) {
+        add_to(io_checksum, frf_period_real(dft, &latched, b, 0));
+        add_to(io_checksum, frf_period_imaginary(dft, &latched, b, 0));
+    }
+}
+
+static void run_exact(const char *name, uint32_t period, uint32_t last, uint32_t bin_count, set_up *set)
 {
     struct frf_dft_config config = {bins, bin_count, 1, words, sizeof words / sizeof *words, 0, 0};
     struct frf_dft dft;
-    struct frf_period latched;
     struct cost cost = {0, 0, 0, 0};
     uint32_t checksum[2] = {1, 0};
     spread_bins(last, bin_count);
     fill(period);
-    if (init_exact(&dft, &config, period, is_q31) != core_ok) {
+    for (uint32_t n = 0; n < period; ++n) {
+        samples_i24[n] = samples[n] * 256 - 77;
+    }
+    uint32_t table_bytes = set(&dft, &config, period);
+    if (table_bytes == 0) {
         port_exit(1);
     }
     uint32_t begin = port_instructions();
-    frf_dft_add_i16(&dft, samples, period);
+    add_frames(&dft, 0, period);
     cost.at_once = port_instructions() - begin;
-    if (!frf_dft_latest(&dft, &latched)) {
-        port_exit(1);
-    }
-    for (uint32_t b = 0; b < bin_count; ++b) {
-        add_to(checksum, frf_period_real(&dft, &latched, b, 0));
-        add_to(checksum, frf_period_imaginary(&dft, &latched, b, 0));
-    }
+    add_sums(&dft, checksum);
     begin = port_instructions();
     for (uint32_t n = 0; n < period; ++n) {
         uint32_t before = port_instructions();
-        frf_dft_add_i16(&dft, samples + n, 1);
+        add_frames(&dft, n, 1);
         uint32_t count = port_instructions() - before;
         cost.longest = count > cost.longest ? count : cost.longest;
     }
     cost.by_frames = port_instructions() - begin;
     cost.longest_spread = cost.longest;
-    print_case(name, 1, &cost, period * bin_count, 8u * FRF_STORAGE_WORDS(bin_count, 1u),
-               (is_q31 ? 4u : 2u) * FRF_TWIDDLE_WORDS(period), checksum);
+    print_case(name, 1, &cost, period * bin_count, 8u * FRF_STORAGE_WORDS(bin_count, 1u), table_bytes, checksum);
+}
+
+static void run_all_exact(void)
+{
+    static const struct {
+        const char *name;
+        set_up *set;
+    } cases[] = {{"exact-q15", full_q15}, {"exact-q15-quarter", quarter_q15}, {"exact-q15-two-level", two_level_q15},
+                 {"exact-q23", full_q23}, {"exact-q23-quarter", quarter_q23}, {"exact-q23-two-level", two_level_q23},
+                 {"exact-q31", full_q31}, {"exact-q31-quarter", quarter_q31}, {"exact-q31-two-level", two_level_q31}};
+    for (unsigned i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        run_exact(cases[i].name, 2000, 900, BINS_MAX, cases[i].set);
+    }
 }
 
 int main(void)
 {
-    run_exact("exact-q15", 2000, 900, BINS_MAX, false);
-    run_exact("exact-q31", 2000, 900, BINS_MAX, true);
+    run_all_exact();
     static const uint32_t counts[] = {32, BINS_MAX};
     for (unsigned c = 0; c < 2; ++c) {
         uint32_t count = counts[c];

@@ -11,7 +11,8 @@
 static const double two_pi = 6.283185307179586476925;
 static char study_path[] = "drawn";
 
-double complex study_response(const struct study_plant *plant, double frequency_hz)
+/// Response with the hold, exact.
+static double complex response_of(const struct study_plant *plant, double frequency_hz)
 {
     double step = 1.0 / plant->sample_rate_hz;
     double whole = floor(plant->delay_samples);
@@ -110,7 +111,7 @@ static void draw_periods(struct study_recording *io_self, struct random *random)
         double frequency_hz =
             io_self->bins[k] * io_self->run.sample_rate_hz / (double)io_self->recording.period_samples;
         clean_input[k] = cexp(I * two_pi * random_uniform(random));
-        clean_output[k] = study_response(&io_self->plant, frequency_hz) * clean_input[k];
+        clean_output[k] = response_of(&io_self->plant, frequency_hz) * clean_input[k];
         power += creal(clean_output[k] * conj(clean_output[k])) / (double)lines;
     }
     double noise = sqrt(power) * pow(10.0, -io_self->snr_db / 20.0);
@@ -193,7 +194,7 @@ static double count_lines(const struct study_recording *recording, const struct 
     double factor = strtod(estimate_key(frf, "confidence_95_factor"), NULL);
     size_t inside = 0;
     for (size_t k = 0; k < frf->count; k++) {
-        double complex truth = study_response(&recording->plant, frf->frequency_hz[k]);
+        double complex truth = response_of(&recording->plant, frf->frequency_hz[k]);
         inside += cabs(frf->real[k] + I * frf->imag[k] - truth) <= factor * frf->std[k];
     }
     double share = (double)inside / (double)frf->count;

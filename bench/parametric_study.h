@@ -31,9 +31,6 @@ struct study_plant {
     double delay_samples;
 };
 
-/// Response with the hold, exact.
-double complex study_response(const struct study_plant *plant, double frequency_hz);
-
 /// One recording of a plant as spectra of its periods, noise on output and perhaps on input.
 struct study_recording {
     struct study_plant plant;

@@ -14,7 +14,8 @@ static const double line_ratio = 1.05;
 
 const double quasilog_resonance_hz[quasilog_systems] = {40.0, 80.0, 200.0, 400.0, 800.0, 2000.0, 4000.0};
 
-size_t quasilog_lines(bool linear, double out_frequency_hz[quasilog_lines_max])
+/// Lines from 1 Hz to 16384 Hz: each the next whole Hz or 1.05 times the last, rounded, whichever is higher; or all.
+static size_t lines_of(bool linear, double out_frequency_hz[quasilog_lines_max])
 {
     size_t count = 0;
     for (double f = 1.0; f <= (double)quasilog_lines_max; count++) {
@@ -80,7 +81,7 @@ void quasilog_sum(double damping, struct parametric_model *out_model)
 bool quasilog_open(bool linear, double noise, struct quasilog_experiment *out_self)
 {
     double *frequency_hz = malloc(quasilog_lines_max * sizeof *frequency_hz);
-    size_t count = frequency_hz ? quasilog_lines(linear, frequency_hz) : 0;
+    size_t count = frequency_hz ? lines_of(linear, frequency_hz) : 0;
     *out_self = (struct quasilog_experiment){.count = count, .frequency_hz = frequency_hz};
     out_self->variance = malloc(count * sizeof *out_self->variance);
     out_self->input = malloc(count * sizeof *out_self->input);
@@ -228,7 +229,7 @@ size_t quasilog_band_formula(double damping)
 size_t quasilog_band_counted(double damping, double resonance_hz)
 {
     static double frequency_hz[quasilog_lines_max];
-    size_t lines = quasilog_lines(false, frequency_hz);
+    size_t lines = lines_of(false, frequency_hz);
     size_t count = 0;
     for (size_t k = 0; k < lines; k++) {
         count += fabs(frequency_hz[k] - resonance_hz) <= damping * resonance_hz;

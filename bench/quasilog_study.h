@@ -16,9 +16,6 @@ enum { quasilog_systems = 7, quasilog_lines_max = 16384 };
 /// Resonance frequencies of section 4.5.
 extern const double quasilog_resonance_hz[quasilog_systems];
 
-/// Lines from 1 Hz to 16384 Hz: each the next whole Hz or 1.05 times the last, rounded, whichever is higher; or all.
-size_t quasilog_lines(bool linear, double out_frequency_hz[quasilog_lines_max]);
-
 /// cheby1 of order 2 at 65536 Hz with the given damping and resonance, its gain at 0 Hz made 1.
 void quasilog_system(double damping, double resonance_hz, struct parametric_model *out_model);
 /// The same at 400 Hz plus that at 4000 Hz, order 4.

@@ -218,7 +218,7 @@ static void count_long_periods(uint64_t seed)
     size_t unsettled = 0;
     for (size_t d = 0; d < phase_draws; d++) {
         struct sequential_excitation excitation;
-        double next, next_but_one;
+        double next = 0.0, next_but_one = 0.0;
         if (!sequential_design(kind_lines[sequential_single], sequential_random, seed + d, &excitation) ||
             !sequential_period_difference(&excitation.segments[0], &play, &next, &next_but_one)) {
             fail();

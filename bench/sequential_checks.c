@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const double sequential_band_hz[sequential_bands + 1] = {0.0, 1.5, 6.1, 30.0};
+static const double band_hz[sequential_bands + 1] = {0.0, 1.5, 6.1, 30.0};
 
 enum { octaves = 8 };
 
@@ -393,7 +393,7 @@ bool sequential_static(const char *lines, double a2, double a3, size_t draws, ui
             sequential_free(&excitation);
         }
     }
-    *out_levels = levels_of(&tally, sequential_band_hz[0], sequential_band_hz[sequential_bands]);
+    *out_levels = levels_of(&tally, band_hz[0], band_hz[sequential_bands]);
     free(recording.position_m);
     return done;
 }
@@ -432,7 +432,7 @@ bool sequential_distortion(const char *lines, const struct cubic_plant *plant, d
         }
     }
     for (size_t band = 0; band < sequential_bands; band++) {
-        out_levels[band] = levels_of(&tally, sequential_band_hz[band], sequential_band_hz[band + 1]);
+        out_levels[band] = levels_of(&tally, band_hz[band], band_hz[band + 1]);
     }
     return done;
 }
@@ -459,7 +459,6 @@ bool sequential_count_products(size_t lowest, struct sequential_products *out_pr
     }
     out_products->second_order = open.second_order_lines;
     out_products->third_harmonics = open.hits[design_product_third_harmonic].lines;
-    out_products->double_minus_hits = open.hits[design_product_double_minus].lines;
     out_products->second_inclusive = closed.second_order_lines;
     design_intermodulation_free(&open);
     design_intermodulation_free(&closed);

@@ -37,9 +37,7 @@ struct sequential_levels {
 bool sequential_static(const char *lines, double a2, double a3, size_t draws, uint64_t seed,
                        struct sequential_levels *out_levels);
 
-enum { sequential_bands = 3 };
-/// Below 1.5 Hz, 1.5 to 6 Hz, above: edges of the bands in which errors are given.
-extern const double sequential_band_hz[sequential_bands + 1];
+enum { sequential_bands = 3 }; ///< below 1.5 Hz, 1.5 to 6 Hz, above
 
 /// The same on the plant, four periods after 200 s of settling, in each of the bands. `lines` may also be
 /// "octaves-random-odd": octaves with odd lines only, of each four neighbours one left out.
@@ -53,7 +51,6 @@ struct sequential_products {
     size_t second_inclusive;  ///< second_order of L .. 2L, the upper edge closed
     size_t triples;           ///< ordered (f1, f2, f3) with f1 + f2 - f3 in the band
     size_t trivial;           ///< of those, f3 = f1 or f2: in phase with the line, it changes the gain
-    size_t double_minus_hits; ///< lines hit by 2 f1 - f2
 };
 
 /// Errors: false if memory is short

@@ -77,16 +77,8 @@ static bool inject(struct fault_port *self, const struct inproc_fault *fault, st
         withheld = acts = hold_back(self, frame, fault, outgoing);
         break;
     case inproc_corrupt:
-        acts = fault->byte < frame->length && fault->mask != 0;
-        if (acts) {
-            frame->data[fault->byte] ^= fault->mask;
-        }
-        break;
     case inproc_shorten:
-        acts = frame->length > 0;
-        if (acts) {
-            frame->data[--frame->length] = 0;
-        }
+        acts = inproc_fault_alter(fault, frame);
         break;
     case inproc_bus_off: // with this frame's end
         self->off = true;
@@ -110,8 +102,7 @@ static enum can_status process(struct fault_port *self, const struct can_frame *
     size_t waiting_before = self->late_count;
     for (size_t i = 0; i < self->fault_count; i++) {
         const struct inproc_fault *fault = &self->faults[i];
-        bool any = fault->cob_id == inproc_any;
-        if ((any || fault->cob_id == frame.id) && fault->nth == (any ? of_all : of_id)) {
+        if (inproc_fault_meets(fault, original, of_all, of_id)) {
             withheld = inject(self, fault, &frame, outgoing, &twice) || withheld;
         }
     }

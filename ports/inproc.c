@@ -203,6 +203,25 @@ static bool hold_back(struct inproc_bus *self, const struct can_frame *frame, co
     return true;
 }
 
+bool inproc_fault_meets(const struct inproc_fault *fault, const struct can_frame *frame, uint32_t of_all,
+                        uint32_t of_id)
+{
+    return fault->cob_id == inproc_any ? fault->nth == of_all : fault->cob_id == frame->id && fault->nth == of_id;
+}
+
+bool inproc_fault_alter(const struct inproc_fault *fault, struct can_frame *io_frame)
+{
+    if (fault->kind == inproc_shorten && io_frame->length > 0) {
+        io_frame->data[--io_frame->length] = 0;
+        return true;
+    }
+    if (fault->kind == inproc_corrupt && fault->byte < io_frame->length && fault->mask != 0) {
+        io_frame->data[fault->byte] ^= fault->mask;
+        return true;
+    }
+    return false;
+}
+
 /// Lets one fault act on the frame that has just ended; true if the frame does not reach its receivers now.
 static bool inject(struct inproc_bus *self, const struct inproc_fault *fault, struct can_frame *frame)
 {
@@ -218,14 +237,8 @@ static bool inject(struct inproc_bus *self, const struct inproc_fault *fault, st
         withheld = acts = hold_back(self, frame, fault);
         break;
     case inproc_corrupt:
-        acts = fault->byte < frame->length && fault->mask != 0;
-        if (acts)
-            frame->data[fault->byte] ^= fault->mask;
-        break;
     case inproc_shorten:
-        acts = frame->length > 0;
-        if (acts)
-            frame->data[--frame->length] = 0;
+        acts = inproc_fault_alter(fault, frame);
         break;
     case inproc_bus_error:
         withheld = true;
@@ -256,9 +269,7 @@ static void end_frame(struct inproc_bus *self)
     bool withheld = false, again = false;
     for (size_t i = 0; i < self->fault_count; i++) {
         const struct inproc_fault *fault = &self->faults[i];
-        if (fault->nth != (fault->cob_id == inproc_any ? of_all : of_id))
-            continue;
-        if (fault->cob_id != inproc_any && fault->cob_id != frame.id)
+        if (!inproc_fault_meets(fault, &original, of_all, of_id))
             continue;
         withheld = inject(self, fault, &frame) || withheld;
         again = again || fault->kind == inproc_duplicate || fault->kind == inproc_bus_error;

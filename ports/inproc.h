@@ -48,6 +48,14 @@ struct inproc_fault {
     uint8_t endpoint;
 };
 
+/// Whether `frame` is the one a fault is meant for; it is number `of_all` of all frames and `of_id` of its identifier,
+/// counted from 1.
+bool inproc_fault_meets(const struct inproc_fault *fault, const struct can_frame *frame, uint32_t of_all,
+                        uint32_t of_id);
+
+/// Corrupts or shortens a frame; false if nothing changes.
+bool inproc_fault_alter(const struct inproc_fault *fault, struct can_frame *io_frame);
+
 /// What happened since the bus was made.
 struct inproc_counters {
     uint32_t frames;                       ///< on the wire, retransmissions included

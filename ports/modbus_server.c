@@ -2,6 +2,7 @@
 #include "ports/modbus_server.h"
 
 #include "ports/place.h"
+#include "ports/wall_clock.h"
 
 #include <arpa/inet.h>
 #include <errno.h>
@@ -14,21 +15,11 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <termios.h>
-#include <time.h>
 #include <unistd.h>
-
-const double modbus_server_idle_s = 10.0;
 
 /// A host's serial port delivers a frame in lumps some milliseconds apart, so that the standard's 1.75 ms would cut
 /// frames in pieces.
 enum { host_silence_us = 5000, listen_backlog = 4 };
-
-static double now_s(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
 
 static void start(struct modbus_server *self, struct modbus_map *map)
 {
@@ -198,7 +189,7 @@ static void accept_client(struct modbus_server *self)
 static bool commander_is_idle(struct modbus_server *self)
 {
     struct modbus_report report;
-    if (now_s() - self->written_s < modbus_server_idle_s) {
+    if (wall_clock_now_s() - self->written_s < modbus_server_idle_s) {
         return false;
     }
     self->map->config.device.report(self->map->config.device.self, &report);
@@ -228,7 +219,7 @@ static bool serve_bytes(struct modbus_server *self, int index, const uint8_t *by
         uint32_t taken = modbus_tcp_slave_take(&client->slave, may_write(self, index), bytes, size, reply, &length);
         if (client->slave.has_written) {
             self->commander = index;
-            self->written_s = now_s();
+            self->written_s = wall_clock_now_s();
         }
         if (client->slave.broken || (length > 0 && !send_all(client->socket, reply, length))) {
             return false;
@@ -256,7 +247,7 @@ static void serve_client(struct modbus_server *self, int index)
 
 static uint64_t now_us(void)
 {
-    return (uint64_t)(now_s() * 1e6);
+    return (uint64_t)(wall_clock_now_s() * 1e6);
 }
 
 static void poll_line(struct modbus_server *self)
@@ -338,12 +329,12 @@ static int wait_ms(const struct modbus_server *self, double seconds)
 
 bool modbus_server_run(struct modbus_server *self, double seconds)
 {
-    double until_s = now_s() + seconds;
+    double until_s = wall_clock_now_s() + seconds;
     do {
         struct pollfd files[polled_max];
         int clients[polled_max];
         nfds_t count = collect(self, files, clients);
-        int ready = poll(files, count, wait_ms(self, until_s - now_s()));
+        int ready = poll(files, count, wait_ms(self, until_s - wall_clock_now_s()));
         if (ready < 0) {
             return errno == EINTR;
         }
@@ -353,7 +344,7 @@ bool modbus_server_run(struct modbus_server *self, double seconds)
         if (self->line >= 0) {
             poll_line(self);
         }
-    } while (!self->line_lost && now_s() < until_s);
+    } while (!self->line_lost && wall_clock_now_s() < until_s);
     return !self->line_lost;
 }
 

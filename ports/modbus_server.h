@@ -13,8 +13,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { modbus_server_clients = 4 };
-extern const double modbus_server_idle_s;
+enum { modbus_server_clients = 4, modbus_server_idle_s = 10 };
 
 struct modbus_server_client {
     int socket; ///< -1: free

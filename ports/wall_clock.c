@@ -25,6 +25,11 @@ uint64_t wall_clock_us(const struct wall_clock *self)
     return (read_ns(CLOCK_MONOTONIC) - self->origin_ns) / us_ns;
 }
 
+double wall_clock_now_s(void)
+{
+    return 1e-9 * (double)read_ns(CLOCK_MONOTONIC);
+}
+
 uint64_t wall_clock_of_stamp_us(struct wall_clock *self, uint64_t now_us, int64_t seconds, int64_t nanoseconds)
 {
     const uint64_t compare_each_us = 500000;

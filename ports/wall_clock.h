@@ -18,6 +18,9 @@ void wall_clock_start(struct wall_clock *self);
 
 uint64_t wall_clock_us(const struct wall_clock *self);
 
+/// Seconds of CLOCK_MONOTONIC since some origin: for differences.
+double wall_clock_now_s(void);
+
 /// Converts a stamp of CLOCK_REALTIME (what the kernel puts on a frame) to this clock.
 /// The two clocks are compared each half second, not at every frame: a read costs as much as a frame on some machines.
 /// They drift apart by less than 1e-3 of that; a step of the machine's time spoils stamps until the next comparison.

@@ -91,26 +91,14 @@ static uint32_t write_pdo(void *owner, const struct od_entry *entry, int64_t val
     return pdo_set_transmission_type(pdo, direction, (uint8_t)value);
 }
 
-#define AT(member) offsetof(struct canopen_node, member)
-#define CONSTANT(index, sub, type, value)                                                                              \
-    {                                                                                                                  \
-        index, sub, type, od_readable | od_constant, 0, value, NULL                                                    \
-    }
-#define READ_ONLY(index, sub, type, member)                                                                            \
-    {                                                                                                                  \
-        index, sub, type, od_readable, AT(member), 0, NULL                                                             \
-    }
+#define READ_ONLY(index, sub, type, member) OD_ENTRY(index, sub, type, od_readable, canopen_node, member, NULL)
 #define WRITABLE(index, sub, type, member, write)                                                                      \
-    {                                                                                                                  \
-        index, sub, type, od_readable | od_writable, AT(member), 0, write                                              \
-    }
+    OD_ENTRY(index, sub, type, od_readable | od_writable, canopen_node, member, write)
 #define MAPPABLE(index, sub, member, direction)                                                                        \
-    {                                                                                                                  \
-        index, sub, od_u8, od_readable | direction, AT(member), 0, NULL                                                \
-    }
+    OD_ENTRY(index, sub, od_u8, od_readable | direction, canopen_node, member, NULL)
 
 #define PDO_PARAMETERS(base, highest, pdo)                                                                             \
-    CONSTANT(base, 0, od_u8, highest), WRITABLE(base, 1, od_u32, pdo.cob_id, write_pdo),                               \
+    OD_CONSTANT(base, 0, od_u8, highest), WRITABLE(base, 1, od_u32, pdo.cob_id, write_pdo),                            \
         WRITABLE(base, 2, od_u8, pdo.transmission_type, write_pdo)
 
 #define TPDO_TIMES(base, pdo)                                                                                          \
@@ -147,28 +135,28 @@ static const struct od_entry communication_entries[] = {
     READ_ONLY(0x1009, 0, od_string, hardware_version),
     READ_ONLY(0x100A, 0, od_string, software_version),
     READ_ONLY(0x1014, 0, od_u32, emcy_cob_id),
-    CONSTANT(0x1016, 0, od_u8, 1),
+    OD_CONSTANT(0x1016, 0, od_u8, 1),
     WRITABLE(0x1016, 1, od_u32, consumer_entry, write_heartbeat_consumer),
     WRITABLE(0x1017, 0, od_u16, heartbeat_ms, write_heartbeat_period),
-    CONSTANT(0x1018, 0, od_u8, 4),
+    OD_CONSTANT(0x1018, 0, od_u8, 4),
     READ_ONLY(0x1018, 1, od_u32, identity.vendor),
     READ_ONLY(0x1018, 2, od_u32, identity.product),
     READ_ONLY(0x1018, 3, od_u32, identity.revision),
     READ_ONLY(0x1018, 4, od_u32, identity.serial),
     WRITABLE(0x1019, 0, od_u8, sync.overflow, write_sync_overflow),
-    CONSTANT(0x1029, 0, od_u8, 1),
+    OD_CONSTANT(0x1029, 0, od_u8, 1),
     WRITABLE(0x1029, 1, od_u8, error_behaviour, write_error_behaviour),
-    CONSTANT(0x1200, 0, od_u8, 2),
+    OD_CONSTANT(0x1200, 0, od_u8, 2),
     READ_ONLY(0x1200, 1, od_u32, sdo_cob_ids[0]),
     READ_ONLY(0x1200, 2, od_u32, sdo_cob_ids[1]),
     PDO(0),
     PDO(1),
     PDO(2),
     PDO(3),
-    CONSTANT(pdo_check_sample_index, 0, od_u8, 2),
+    OD_CONSTANT(pdo_check_sample_index, 0, od_u8, 2),
     MAPPABLE(pdo_check_sample_index, 1, sample_counter, od_mappable_transmit),
     MAPPABLE(pdo_check_sample_index, 2, sample_check, od_mappable_transmit),
-    CONSTANT(pdo_check_target_index, 0, od_u8, 2),
+    OD_CONSTANT(pdo_check_target_index, 0, od_u8, 2),
     MAPPABLE(pdo_check_target_index, 1, target_counter, od_mappable_receive),
     MAPPABLE(pdo_check_target_index, 2, target_check, od_mappable_receive),
 };

@@ -5,7 +5,8 @@
 
 #include <string.h>
 
-struct can_frame emcy_frame(uint8_t node_id, const struct emcy_message *message)
+/// Makes the frame of a node's emergency.
+static struct can_frame make_frame(uint8_t node_id, const struct emcy_message *message)
 {
     struct can_frame frame = can_frame_make((uint16_t)(emcy_cob_id + node_id), 8);
     can_put(frame.data, 2, message->code);
@@ -34,7 +35,7 @@ struct can_frame emcy_producer_raise(struct emcy_producer *self, uint16_t code, 
     if (self->history_count < emcy_history_max)
         self->history_count++;
     struct emcy_message message = {.code = code, .error_register = self->error_register};
-    return emcy_frame(self->node_id, &message);
+    return make_frame(self->node_id, &message);
 }
 
 void emcy_producer_forget(struct emcy_producer *self)
@@ -47,7 +48,7 @@ struct can_frame emcy_producer_clear(struct emcy_producer *self)
 {
     self->error_register = 0;
     struct emcy_message message = {.code = emcy_no_error};
-    return emcy_frame(self->node_id, &message);
+    return make_frame(self->node_id, &message);
 }
 
 const char *emcy_code_str(uint16_t code)

@@ -48,9 +48,6 @@ struct emcy_producer {
     uint32_t history[emcy_history_max]; ///< newest first
 };
 
-/// Makes the frame of a node's emergency.
-struct can_frame emcy_frame(uint8_t node_id, const struct emcy_message *message);
-
 /// Reads an emergency of node `node_id`; false if the frame is none. A SYNC (same identifier plus 0) is none.
 bool emcy_parse(const struct can_frame *frame, uint8_t node_id, struct emcy_message *out_message);
 

@@ -44,18 +44,3 @@ enum nmt_state nmt_state_after(enum nmt_state state, enum nmt_command command)
     }
     return state;
 }
-
-const char *nmt_state_str(enum nmt_state state)
-{
-    switch (state) {
-    case nmt_initialising:
-        return "initialising";
-    case nmt_stopped:
-        return "stopped";
-    case nmt_operational:
-        return "operational";
-    case nmt_pre_operational:
-        return "pre-operational";
-    }
-    return "unknown";
-}

@@ -33,6 +33,4 @@ enum nmt_command nmt_command_parse(const struct can_frame *frame, uint8_t node_i
 /// State after a command. Both resets lead through nmt_initialising.
 enum nmt_state nmt_state_after(enum nmt_state state, enum nmt_command command);
 
-const char *nmt_state_str(enum nmt_state state);
-
 #endif

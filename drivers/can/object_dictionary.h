@@ -77,6 +77,16 @@ struct od_entry {
     uint32_t (*write)(void *owner, const struct od_entry *entry, int64_t value);
 };
 
+/// Rows of a table of entries; `owner` is the struct that holds `member`.
+#define OD_CONSTANT(index, sub, type, value)                                                                           \
+    {                                                                                                                  \
+        index, sub, type, od_readable | od_constant, 0, value, NULL                                                    \
+    }
+#define OD_ENTRY(index, sub, type, access, owner, member, write)                                                       \
+    {                                                                                                                  \
+        index, sub, type, access, offsetof(struct owner, member), 0, write                                             \
+    }
+
 struct od_section {
     const struct od_entry *entries;
     size_t count;

@@ -15,8 +15,10 @@ bool pdo_is_synchronous(const struct pdo *self)
     return self->transmission_type <= 240;
 }
 
-uint32_t pdo_check_entry(const struct object_dictionary *dictionary, enum pdo_direction direction, uint32_t mapped,
-                         struct od_place *out_place)
+/// Checks a mapping entry against the dictionary: exists, mappable in this direction, the right length. Returns an
+/// abort code.
+static uint32_t check_entry(const struct object_dictionary *dictionary, enum pdo_direction direction, uint32_t mapped,
+                            struct od_place *out_place)
 {
     uint32_t abort_code = od_locate(dictionary, (uint16_t)(mapped >> 16), (uint8_t)(mapped >> 8), out_place);
     if (abort_code != od_abort_none)
@@ -37,7 +39,7 @@ uint32_t pdo_set_entry(struct pdo *self, const struct object_dictionary *diction
     if (pdo_is_enabled(self) || self->mapped_count != 0)
         return od_abort_access;
     struct od_place place = {0};
-    uint32_t abort_code = mapped == 0 ? od_abort_none : pdo_check_entry(dictionary, direction, mapped, &place);
+    uint32_t abort_code = mapped == 0 ? od_abort_none : check_entry(dictionary, direction, mapped, &place);
     if (abort_code == od_abort_none)
         self->mapped[number - 1] = mapped;
     return abort_code;
@@ -53,7 +55,7 @@ uint32_t pdo_set_count(struct pdo *self, const struct object_dictionary *diction
     unsigned length = 0;
     struct od_place places[pdo_entries_max] = {{0}};
     for (uint8_t i = 0; i < count; i++) {
-        uint32_t abort_code = pdo_check_entry(dictionary, direction, self->mapped[i], &places[i]);
+        uint32_t abort_code = check_entry(dictionary, direction, self->mapped[i], &places[i]);
         if (abort_code != od_abort_none)
             return abort_code;
         length += od_type_size(places[i].entry->type);
@@ -155,14 +157,15 @@ bool pdo_due(struct pdo *self)
     return true;
 }
 
-bool pdo_is_event_driven(const struct pdo *self)
+/// Whether a TPDO goes out with events rather than with SYNC.
+static bool is_event_driven(const struct pdo *self)
 {
     return pdo_is_enabled(self) && self->transmission_type >= 254;
 }
 
 uint64_t pdo_event_deadline_us(const struct pdo *self)
 {
-    if (!pdo_is_event_driven(self) || self->mapped_count == 0)
+    if (!is_event_driven(self) || self->mapped_count == 0)
         return CAN_NEVER_US;
     if (!self->sent)
         return 0;

@@ -44,11 +44,6 @@ bool pdo_is_enabled(const struct pdo *self);
 
 bool pdo_is_synchronous(const struct pdo *self);
 
-/// Checks a mapping entry against the dictionary: exists, mappable in this direction, the right length. Returns an
-/// abort code.
-uint32_t pdo_check_entry(const struct object_dictionary *dictionary, enum pdo_direction direction, uint32_t mapped,
-                         struct od_place *out_place);
-
 /// Writes mapping entry 1..8; only while the PDO is disabled and the count is 0.
 uint32_t pdo_set_entry(struct pdo *self, const struct object_dictionary *dictionary, enum pdo_direction direction,
                        uint8_t number, uint32_t mapped);
@@ -76,9 +71,6 @@ struct can_frame pdo_make(const struct pdo *self);
 
 /// Whether a synchronous TPDO goes out with this SYNC; counts it.
 bool pdo_due(struct pdo *self);
-
-/// Whether a TPDO goes out with events rather than with SYNC.
-bool pdo_is_event_driven(const struct pdo *self);
 
 /// When an event-driven TPDO is due: at once if it has never been sent or has changed, but not within the inhibit time;
 /// with the event timer at the latest. CAN_NEVER_US if nothing is pending.

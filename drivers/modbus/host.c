@@ -158,8 +158,6 @@ enum modbus_host_status modbus_host_read_state(struct modbus_host *self, struct 
         .velocity = f32_at(at + 0x14),
         .trip_value = f32_at(at + 0x16),
         .table_name = u32_at(at + 0x18),
-        .table_samples = u32_at(at + 0x1A),
-        .table_bins = u32_at(at + 0x1C),
         .rate_hz = f32_at(at + 0x1E),
     };
     *out_state = state;

@@ -43,7 +43,7 @@ struct modbus_host_state {
     enum modbus_end end;
     uint32_t faults, periods_done, periods_valid, samples_played, torque_clipped, cycles_max;
     float torque, position, velocity, trip_value;
-    uint32_t table_name, table_samples, table_bins;
+    uint32_t table_name;
     float rate_hz;
     uint16_t setup[30]; ///< as on the wire
 };

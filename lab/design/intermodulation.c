@@ -123,17 +123,18 @@ static bool is_line(const bool *excited, uint32_t bin, uint32_t divisor)
     return bin % divisor == 0 && excited[bin / divisor];
 }
 
-/// Products that fall on one excited line: ordered sums less those with equal lines, over the orders that count as one.
-static void count_on_line(const struct sums *sums, const bool *excited, size_t line_count, uint32_t bin,
-                          int64_t out_products[design_product_count])
+/// Products that fall on one bin: ordered sums less those with equal lines, over the orders that count as one.
+static void count_on_bin(const struct sums *sums, const bool *excited, size_t line_count, uint32_t bin,
+                         int64_t out_products[design_product_count])
 {
     const int64_t half = is_line(excited, bin, 2);
     const int64_t third = is_line(excited, bin, 3);
     const int64_t double_plus = plus(sums, sums->double_plus_minus, bin) - third;
-    const int64_t double_minus = minus(sums, sums->double_plus_minus, bin) - 1; // 2 f - f
+    const int64_t line = excited[bin];
+    const int64_t double_minus = minus(sums, sums->double_plus_minus, bin) - line; // 2 f - f
     const int64_t double_folded = minus_folded(sums, sums->double_plus_minus, bin);
     // f + f3 - f3 and f3 + f - f3 for each line f3, the case f3 = f in both.
-    const int64_t trivial = 2 * (int64_t)line_count - 1;
+    const int64_t trivial = line * (2 * (int64_t)line_count - 1);
     const int64_t triple_minus = minus(sums, sums->triple_sum_difference, bin) - trivial - double_minus;
     const int64_t triple_folded = minus_folded(sums, sums->triple_sum_difference, bin) - double_folded;
     out_products[design_product_second_harmonic] = half;
@@ -215,7 +216,7 @@ bool design_intermodulation_count(size_t line_count, const uint32_t *bins, struc
     }
     for (size_t k = 0; k < line_count; k++) {
         int64_t products[design_product_count];
-        count_on_line(&sums, excited, line_count, bins[k], products);
+        count_on_bin(&sums, excited, line_count, bins[k], products);
         add_line(products, out_counts);
     }
     sums_free(&sums);
@@ -225,6 +226,61 @@ bool design_intermodulation_count(size_t line_count, const uint32_t *bins, struc
         design_intermodulation_free(out_counts);
     }
     return complete;
+}
+
+static void map_bin(const struct sums *sums, const bool *excited, size_t line_count, uint32_t bin,
+                    struct design_product_map *io)
+{
+    int64_t products[design_product_count];
+    int64_t orders[2] = {0, 0};
+    count_on_bin(sums, excited, line_count, bin, products);
+    for (int kind = 0; kind < design_product_count; kind++) {
+        orders[kind > (int)design_product_difference] += products[kind];
+    }
+    io->bins[io->count] = bin;
+    io->excited[io->count] = excited[bin];
+    io->second_order[io->count] = (double)orders[0];
+    io->third_order[io->count] = (double)orders[1];
+    io->count++;
+}
+
+bool design_intermodulation_map(size_t line_count, const uint32_t *bins, struct design_product_map *out_map)
+{
+    const uint32_t highest = bins[line_count - 1];
+    const uint32_t spacing = common_divisor(line_count, bins);
+    const size_t most = (highest - bins[0]) / spacing + 1;
+    struct sums sums;
+    bool *excited = calloc((size_t)highest + 1, sizeof *excited);
+    *out_map = (struct design_product_map){
+        .bins = malloc(most * sizeof(uint32_t)),
+        .excited = malloc(most * sizeof(bool)),
+        .second_order = malloc(most * sizeof(double)),
+        .third_order = malloc(most * sizeof(double)),
+    };
+    if (!excited || !out_map->bins || !out_map->excited || !out_map->second_order || !out_map->third_order ||
+        !sums_create(line_count, bins, &sums)) {
+        free(excited);
+        design_product_map_free(out_map);
+        return false;
+    }
+    for (size_t k = 0; k < line_count; k++) {
+        excited[bins[k]] = true;
+    }
+    for (size_t i = 0; i < most; i++) {
+        map_bin(&sums, excited, line_count, bins[0] + (uint32_t)i * spacing, out_map);
+    }
+    sums_free(&sums);
+    free(excited);
+    return true;
+}
+
+void design_product_map_free(struct design_product_map *self)
+{
+    free(self->bins);
+    free(self->excited);
+    free(self->second_order);
+    free(self->third_order);
+    *self = (struct design_product_map){0};
 }
 
 void design_intermodulation_free(struct design_intermodulation *counts)

@@ -53,6 +53,18 @@ struct design_intermodulation {
 bool design_intermodulation_count(size_t line_count, const uint32_t *bins, struct design_intermodulation *out_counts);
 void design_intermodulation_free(struct design_intermodulation *counts);
 
+/// How many products fall on each multiple of the spacing from the lowest to the highest line, excited or not.
+struct design_product_map {
+    size_t count;
+    uint32_t *bins; ///< owned, as the others
+    bool *excited;
+    double *second_order, *third_order;
+};
+
+/// Counts as design_intermodulation_count() does. Shapes, errors and cost are the same.
+bool design_intermodulation_map(size_t line_count, const uint32_t *bins, struct design_product_map *out_map);
+void design_product_map_free(struct design_product_map *self);
+
 /// Two or three sentences for a person, in numbers, no newline. Returns what snprintf would.
 int design_intermodulation_describe(const struct design_intermodulation *self, char *out_text, size_t size);
 

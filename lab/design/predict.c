@@ -94,8 +94,7 @@ static void play_with_torque(struct player *self, double torque, struct sim_samp
     play(self, 0, 0, out_sample);
     sim_actuator_hold(&actuator, out_sample->torque_ref);
     for (size_t i = 0; i < sim_substeps; i++) {
-        const double motor = sim_actuator_substep(&actuator, stepper, i) + torque;
-        sim_plant_move(&plant, stepper, motor);
+        sim_plant_drive(&plant, stepper, &actuator, i, torque);
     }
     self->drive.plant = plant;
 }

@@ -7,8 +7,8 @@
 
 enum { search_points = 40 }; ///< per highest line
 
-size_t design_search_grid(const struct design_request *request, const struct design_spectrum *spectrum,
-                          size_t points_per_highest_line)
+static size_t grid_of(const struct design_request *request, const struct design_spectrum *spectrum,
+                      size_t points_per_highest_line)
 {
     if (request->grid == design_grid_samples) {
         return request->period_samples;
@@ -53,8 +53,7 @@ bool design_search_create(const struct design_request *request, const struct des
 {
     struct design_request prescribed = *request;
     prescribed.amplitude_tolerance_db = 0;
-    return design_search_create_on(&prescribed, spectrum, design_search_grid(request, spectrum, search_points), 1,
-                                   out_search);
+    return design_search_create_on(&prescribed, spectrum, grid_of(request, spectrum, search_points), 1, out_search);
 }
 
 void design_search_free(struct design_search *self)

@@ -28,9 +28,6 @@ bool design_search_create(const struct design_request *request, const struct des
 /// choice.
 bool design_search_create_on(const struct design_request *request, const struct design_spectrum *spectrum, size_t grid,
                              size_t fold, struct design_search *out_search);
-/// The grid of design_search_create() for this many points per highest line.
-size_t design_search_grid(const struct design_request *request, const struct design_spectrum *spectrum,
-                          size_t points_per_highest_line);
 void design_search_free(struct design_search *self);
 
 /// Puts the signals at c into self->packed; returns the largest, in units of its limit.

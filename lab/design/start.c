@@ -21,17 +21,31 @@ static int check_model(const struct design_request *request, struct error *out_e
     return 0;
 }
 
-int design_start_apply(const struct design_request *request, struct design_result *io_result, struct error *out_error)
+static struct design_transient_table table_of(const struct design_request *request, const struct design_result *result)
 {
-    const struct design_transient_table table = {
+    return (struct design_transient_table){
         .rate_hz = (double)request->rate_numerator_hz / request->rate_denominator,
-        .period_samples = io_result->period_samples,
-        .line_count = io_result->bin_count,
-        .bins = io_result->bins,
-        .amplitude_rad = io_result->amplitude_rad,
-        .phase_rad = io_result->phase_rad,
+        .period_samples = result->period_samples,
+        .line_count = result->bin_count,
+        .bins = result->bins,
+        .amplitude_rad = result->amplitude_rad,
+        .phase_rad = result->phase_rad,
         .inertia_kgm2 = request->inertia_kgm2,
     };
+}
+
+bool design_start_shares(const struct design_request *request, const struct design_result *result, double *out_shares)
+{
+    const struct design_transient_table table = table_of(request, result);
+    const enum design_loop_mode mode = request->torque_mode ? design_loop_torque : design_loop_cascade;
+    const struct sim_model *drive = request->start == design_start_model ? request->start_model : NULL;
+    struct error ignored;
+    return design_start_map(&table, drive, mode, out_shares, &ignored) == 0;
+}
+
+int design_start_apply(const struct design_request *request, struct design_result *io_result, struct error *out_error)
+{
+    const struct design_transient_table table = table_of(request, io_result);
     const enum design_loop_mode mode = request->torque_mode ? design_loop_torque : design_loop_cascade;
     const bool known = request->start == design_start_model;
     int status = known ? check_model(request, out_error) : 0;

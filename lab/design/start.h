@@ -11,4 +11,11 @@
 ///         an undamped resonance on a line); a bank that can say nothing leaves the transient unknown
 int design_start_apply(const struct design_request *request, struct design_result *io_result, struct error *out_error);
 
+/// What design_start_apply() would expect if the period began at another sample: energy of the transient as a share of
+/// the steady state's, for each.
+/// Shapes: out_shares: result->period_samples
+/// Cost:   that of design_start_choose()
+/// Errors: false if it is not known or memory is short
+bool design_start_shares(const struct design_request *request, const struct design_result *result, double *out_shares);
+
 #endif

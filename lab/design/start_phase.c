@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
+#include <string.h>
 
 size_t design_start_phase_paper(size_t samples, const double *velocity_rad_per_s, const double *acceleration_rad_per_s2)
 {
@@ -117,21 +118,32 @@ static int ask(struct question *self, const struct sim_model *drive, struct erro
     return drive ? ask_drive(self, drive, false, out_error) : ask_bank(self, out_error);
 }
 
+int design_start_map(const struct design_transient_table *table, const struct sim_model *drive,
+                     enum design_loop_mode mode, double *out_shares, struct error *out_error)
+{
+    struct question question = {.table = table, .mode = mode, .shares = out_shares};
+    memset(out_shares, 0, table->period_samples * sizeof *out_shares);
+    int status = ask(&question, drive, out_error);
+    for (size_t n = 0; !status && n < table->period_samples; n++) {
+        out_shares[n] /= (double)question.drives;
+    }
+    return status;
+}
+
 int design_start_choose(const struct design_transient_table *table, const struct sim_model *drive,
                         enum design_loop_mode mode, size_t *out_start_index, double *out_share, struct error *out_error)
 {
-    struct question question = {.table = table, .mode = mode};
-    question.shares = calloc(table->period_samples, sizeof *question.shares);
-    int status = question.shares ? ask(&question, drive, out_error) : refuse_memory(out_error);
+    double *shares = calloc(table->period_samples, sizeof *shares);
+    int status = shares ? design_start_map(table, drive, mode, shares, out_error) : refuse_memory(out_error);
     size_t best = 0;
     for (size_t n = 1; !status && n < table->period_samples; n++) {
-        best = question.shares[n] < question.shares[best] ? n : best;
+        best = shares[n] < shares[best] ? n : best;
     }
     if (!status) {
         *out_start_index = best;
-        *out_share = question.shares[best] / (double)question.drives;
+        *out_share = shares[best];
     }
-    free(question.shares);
+    free(shares);
     return status;
 }
 

@@ -29,6 +29,11 @@ int design_start_choose(const struct design_transient_table *table, const struct
                         enum design_loop_mode mode, size_t *out_start_index, double *out_share,
                         struct error *out_error);
 
+/// The share for each sample of the period, instead of the least of them.
+/// Shapes: out_shares: table->period_samples
+int design_start_map(const struct design_transient_table *table, const struct sim_model *drive,
+                     enum design_loop_mode mode, double *out_shares, struct error *out_error);
+
 /// The same share at a given sample, whatever chose it. No FFT.
 int design_start_expect(const struct design_transient_table *table, const struct sim_model *drive,
                         enum design_loop_mode mode, size_t start_index, double *out_share, struct error *out_error);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/agreement.h"
 
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include <complex.h>

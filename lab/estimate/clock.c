@@ -286,7 +286,6 @@ static struct clock_signal conclude(const struct work *self, const struct fit *f
         .offset_samples = self->offset + fit->offset,
         .offset_std = fit->offset_std,
         .drift_std = fit->drift_std,
-        .scatter_rad = slope * sqrt(expected),
     };
     out.drift_samples = fit->drift_certain || self->drift != 0.0 ? self->drift + fit->drift : 0.0;
     const bool offset_certain = is_certain(out.offset_samples, out.offset_std, dof);

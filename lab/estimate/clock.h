@@ -19,7 +19,6 @@ struct clock_signal {
     double drift_samples; ///< change of that from one period to the next; 0 unless it is certain
     double drift_std;     ///< 0 with fewer than 8 periods, which do not tell
     double wander;        ///< RMS of the delays that neither explains, beyond what noise makes of them; 0: none
-    double scatter_rad;   ///< phase that noise leaves uncertain in one period, RMS over lines by their information
     double slip_rad;      ///< phase by which the recording's two ends differ, RMS over lines by their information
     bool off;             ///< offset or drift are certain
 };

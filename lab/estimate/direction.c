@@ -2,6 +2,7 @@
 #include "lab/estimate/direction.h"
 
 #include "lab/estimate/columns.h"
+#include "lab/numeric/cmplx.h"
 
 #include <complex.h>
 #include <math.h>

@@ -2,6 +2,7 @@
 #include "lab/estimate/distortion.h"
 
 #include "lab/estimate/spectra.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include <complex.h>

@@ -4,6 +4,7 @@
 #include "lab/estimate/circle.h"
 #include "lab/estimate/method.h"
 #include "lab/numeric/clones.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include <math.h>

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/lpm_window.h"
 
+#include "lab/numeric/cmplx.h"
+
 #include <math.h>
 #include <stdlib.h>
 

@@ -5,6 +5,7 @@
 #include "lab/estimate/columns.h"
 #include "lab/estimate/method.h"
 #include "lab/estimate/spectra.h"
+#include "lab/numeric/cmplx.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -192,7 +192,11 @@ static bool set_fit_keys(const struct parametric_outcome *outcome, struct frf *i
            (!outcome->hint[0] || estimate_set_key(io_frf, "parametric_hint", "%s", outcome->hint));
 }
 
-bool parametric_fill_frf(const struct parametric_outcome *outcome, struct frf *io_frf)
+/// Puts the model's response into every line of a response, all of them valid, with std and noise_std, the factor of
+/// their 95 % regions (confidence_95_factor, parametric_region.h), and keys that say what the model is:
+/// parametric_order, parametric_poles, parametric_cost and others (docs/files.md).
+/// Errors: false if memory is short
+static bool fill_frf(const struct parametric_outcome *outcome, struct frf *io_frf)
 {
     const struct parametric_model *model = &outcome->model;
     const struct parametric_model *shown = parametric_shown(outcome);
@@ -270,7 +274,7 @@ static int estimate(const struct periodic *recording, const struct estimate_opti
     fill_lines(out_outcome, out_frf);
     status = estimate_end(recording, out_frf, out_error);
     // After estimate_end, which takes errors for circles.
-    return status || parametric_fill_frf(out_outcome, out_frf) ? status : estimate_refuse_memory(out_frf, out_error);
+    return status || fill_frf(out_outcome, out_frf) ? status : estimate_refuse_memory(out_frf, out_error);
 }
 
 /// Where the outcome goes: to the caller, or to memory of our own that out_own names.
@@ -326,7 +330,7 @@ int frf_parametric_fit(const struct frf *measured, const char *name, const struc
         parametric_spectra_free(&spectra);
     }
     status = status ? status : begin_like(measured, out_frf, out_error);
-    if (!status && !parametric_fill_frf(outcome, out_frf)) {
+    if (!status && !fill_frf(outcome, out_frf)) {
         status = estimate_refuse_memory(out_frf, out_error);
     }
     free(own);

@@ -34,12 +34,6 @@ struct parametric_weights parametric_spectra_weights(struct parametric_spectra *
 
 void parametric_spectra_free(struct parametric_spectra *self);
 
-/// Puts the model's response into every line of a response, all of them valid, with std and noise_std, the factor of
-/// their 95 % regions (confidence_95_factor, parametric_region.h), and keys that say what the model is:
-/// parametric_order, parametric_poles, parametric_cost and others (docs/files.md).
-/// Errors: false if memory is short
-bool parametric_fill_frf(const struct parametric_outcome *outcome, struct frf *io_frf);
-
 /// Model as a JSON object: domain, coefficients with standard deviations (discrete: of z^0, z^-1, ...; continuous: of
 /// s^0, s^1, ... with time in seconds), delay, poles and zeros as frequency and damping, gain, cost and its expected
 /// value, whiteness; with `orders` (may be NULL) every pair that was tried and why one was chosen.

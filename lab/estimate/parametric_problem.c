@@ -50,8 +50,9 @@ void parametric_unpack(const double *theta, struct parametric_model *io_model)
     io_model->delay_s = io_model->structure.delay_free ? theta[layout.transients] : io_model->structure.delay_s;
 }
 
-double complex parametric_variable(const struct parametric_structure *structure, double sample_rate_hz,
-                                   double scale_rad_per_s, double omega_rad_per_s)
+/// x at an angular frequency.
+static double complex variable_at(const struct parametric_structure *structure, double sample_rate_hz,
+                                  double scale_rad_per_s, double omega_rad_per_s)
 {
     if (structure->domain == parametric_continuous) {
         return I * (omega_rad_per_s / scale_rad_per_s);
@@ -88,7 +89,7 @@ void parametric_line_begin(const struct parametric_model *model, double frequenc
 {
     double omega = two_pi * frequency_hz;
     *out_line = (struct parametric_line){
-        .x = parametric_variable(&model->structure, model->sample_rate_hz, model->scale_rad_per_s, omega),
+        .x = variable_at(&model->structure, model->sample_rate_hz, model->scale_rad_per_s, omega),
         .omega_rad_per_s = omega,
         .delay = delay_factor(omega, model->structure.delay_s)};
 }
@@ -399,7 +400,7 @@ int parametric_problem_init(const struct parametric_data *data, const struct par
         double omega = two_pi * data->frequency_hz[k];
         out_self->omega_rad_per_s[k] = omega;
         out_self->delay[k] = delay_factor(omega, structure->delay_s);
-        out_self->x[k] = parametric_variable(structure, data->sample_rate_hz, out_self->scale_rad_per_s, omega);
+        out_self->x[k] = variable_at(structure, data->sample_rate_hz, out_self->scale_rad_per_s, omega);
     }
     return 0;
 }

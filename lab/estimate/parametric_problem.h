@@ -46,10 +46,6 @@ int parametric_problem_init(const struct parametric_data *data, const struct par
                             double scale_rad_per_s, struct parametric_problem *out_self, struct error *out_error);
 void parametric_problem_free(struct parametric_problem *self);
 
-/// x at an angular frequency.
-double complex parametric_variable(const struct parametric_structure *structure, double sample_rate_hz,
-                                   double scale_rad_per_s, double omega_rad_per_s);
-
 /// A line of a model: x, omega_rad_per_s and, for a fixed delay, its factor.
 void parametric_line_begin(const struct parametric_model *model, double frequency_hz, struct parametric_line *out_line);
 

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/ramp.h"
 
+#include "lab/numeric/cmplx.h"
+
 #include <math.h>
 
 static const double pi = 3.141592653589793238463;

@@ -2,6 +2,7 @@
 #include "lab/estimate/realisations.h"
 
 #include "lab/estimate/method.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include <complex.h>
@@ -69,7 +70,13 @@ static void pool_line(const struct frf *runs, const double *weights, size_t coun
     }
 }
 
-int realisations_pool(const struct frf *runs, size_t count, struct frf *out_frf, struct error *out_error)
+/// Pools runs of one excitation, weighed by their periods (alike where there are none).
+/// Equation:  G = sum q_r G_r,  std^2 = sum q_r^2 std_r^2, noise_std alike;  q_r = periods_r / sum periods
+///            distortion levels: root of their mean power
+/// Validity:  a line is valid if it is in every run; degrees of freedom: the sum of all runs'
+/// Keys:      what all runs say alike, sample_rate_hz as their mean, `runs`
+/// Errors:    as estimate_average()
+static int pool_runs(const struct frf *runs, size_t count, struct frf *out_frf, struct error *out_error)
 {
     *out_frf = (struct frf){.count = 0};
     double *weights = malloc(count * sizeof *weights);
@@ -179,7 +186,7 @@ static int pool_groups(const struct frf *runs, size_t count, const struct groups
                 members[size++] = runs[r];
             }
         }
-        status = realisations_pool(members, size, &out_responses[g], out_error);
+        status = pool_runs(members, size, &out_responses[g], out_error);
         if (!status && size > 1 && !agreement_measure(members, size, &within)) {
             status = error_set(out_error, error_refused, "memory is short");
         } else if (!status && size > 1 && (out_within->lines == 0 || within.chance < out_within->chance)) {
@@ -224,7 +231,7 @@ static int average_groups(const struct groups *groups, const struct frf *respons
                           struct error *out_error)
 {
     int status = groups->count > 1 ? estimate_average(responses, groups->count, out_frf, out_error)
-                                   : realisations_pool(responses, 1, out_frf, out_error);
+                                   : pool_runs(responses, 1, out_frf, out_error);
     if (status) {
         return status;
     }

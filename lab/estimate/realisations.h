@@ -11,14 +11,6 @@
 
 #include <stddef.h>
 
-/// Pools runs of one excitation, weighed by their periods (alike where there are none).
-/// Equation:  G = sum q_r G_r,  std^2 = sum q_r^2 std_r^2, noise_std alike;  q_r = periods_r / sum periods
-///            distortion levels: root of their mean power
-/// Validity:  a line is valid if it is in every run; degrees of freedom: the sum of all runs'
-/// Keys:      what all runs say alike, sample_rate_hz as their mean, `runs`
-/// Errors:    as estimate_average()
-int realisations_pool(const struct frf *runs, size_t count, struct frf *out_frf, struct error *out_error);
-
 /// Pools what excitations_compare calls the same and averages what remains (estimate_average).
 ///
 /// Agreement: of the realisations (agreement.h); with a single one, empty (lines 0)

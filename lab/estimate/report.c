@@ -9,28 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { units_size = 64, remark_size = 320 };
-
-/// "rad_per_s/Nm" as a person writes it: "(rad/s)/Nm".
-static void readable_units(const char *units, char out_text[units_size])
-{
-    const char *over = strchr(units, '/');
-    const size_t numerator = over ? (size_t)(over - units) : strlen(units);
-    const bool compound = over && memchr(units, '_', numerator);
-    size_t used = 0;
-    for (const char *at = units; *at && used + 4 < units_size;) {
-        if (at == units && compound) {
-            out_text[used++] = '(';
-        }
-        if (at == over && compound) {
-            out_text[used++] = ')';
-        }
-        const bool per = strncmp(at, "_per_", 5) == 0;
-        out_text[used++] = per ? '/' : *at;
-        at += per ? 5 : 1;
-    }
-    out_text[used] = '\0';
-}
+enum { remark_size = 320 };
 
 static const enum figure_colour curve_colours[frf_report_curves_max] = {figure_vermilion, figure_green, figure_purple,
                                                                         figure_orange};
@@ -38,10 +17,15 @@ static const enum figure_dash curve_dashes[frf_report_curves_max] = {figure_soli
                                                                      figure_dash_dot};
 static const enum figure_marker curve_markers[frf_report_curves_max] = {figure_cross, figure_triangle, figure_square,
                                                                         figure_diamond};
-static const enum figure_colour run_colours[frf_report_runs_max] = {figure_green, figure_purple, figure_orange,
-                                                                    figure_sky};
-static const enum figure_marker run_markers[frf_report_runs_max] = {figure_triangle, figure_square, figure_cross,
-                                                                    figure_diamond};
+/// The response itself is a blue dot.
+static const struct {
+    enum figure_colour colour;
+    enum figure_marker marker;
+} overlay_looks[frf_report_overlays_max] = {
+    {figure_vermilion, figure_triangle}, {figure_green, figure_square}, {figure_purple, figure_cross},
+    {figure_orange, figure_diamond},     {figure_ink, figure_plus},     {figure_sky, figure_ring},
+    {figure_grey, figure_triangle_down},
+};
 
 /// Two panels that show one thing: magnitude and phase.
 struct bode {
@@ -55,6 +39,9 @@ static void add_lines(const struct report_drawing *drawing, const struct frf_rep
     const struct report_lines *lines = &drawing->lines;
     char region[figure_text_max];
     char mean[figure_text_max] = "measured";
+    if (options->name && options->other_count > 0) {
+        snprintf(mean, sizeof mean, "%s", options->name);
+    }
     snprintf(region, sizeof region, drawing->factor_is_95 ? "95 %%: \xC2\xB1%.3g std" : "\xC2\xB1%.3g std",
              drawing->factor);
     if (options->run_count > 1) {
@@ -83,20 +70,33 @@ static void add_lines(const struct report_drawing *drawing, const struct frf_rep
     }
 }
 
-static void add_runs(const struct report_drawing *drawing, const struct frf_report_options *options,
-                     struct bode *panels)
+/// Shapes have to be told apart: larger where there are few.
+static double overlay_size_px(size_t lines)
 {
-    for (size_t r = 0; r < drawing->run_count; r++) {
-        const struct report_lines *run = &drawing->runs[r];
-        struct figure_series *series[2] = {
-            figure_add_points(panels->magnitude, options->run_names[r], run->count, run->frequency_hz,
-                              run->magnitude_db),
-            figure_add_points(panels->phase, "", run->count, run->frequency_hz, run->phase_deg)};
-        for (size_t i = 0; i < 2; i++) {
-            series[i]->colour = run_colours[r];
-            series[i]->marker = run_markers[r];
-            series[i]->size = 3;
-        }
+    return lines <= 60 ? 6.0 : lines <= 300 ? 5.0 : lines <= 1000 ? 4.0 : 3.0;
+}
+
+static void add_overlay(const struct report_overlay *overlay, size_t look, struct bode *panels)
+{
+    const struct report_lines *lines = &overlay->lines;
+    struct figure_panel *const panel[2] = {panels->magnitude, panels->phase};
+    const double *const values[2] = {lines->magnitude_db, lines->phase_deg};
+    for (size_t i = 0; i < 2; i++) {
+        const char *name = i == 0 ? overlay->name : "";
+        struct figure_series *series =
+            overlay->is_model ? figure_add_line(panel[i], name, lines->count, lines->frequency_hz, values[i])
+                              : figure_add_points(panel[i], name, lines->count, lines->frequency_hz, values[i]);
+        series->colour = overlay_looks[look].colour;
+        series->marker = overlay_looks[look].marker;
+        series->dash = figure_dashed;
+        series->size = overlay->is_model ? 0.0 : overlay_size_px(lines->count);
+    }
+}
+
+static void add_overlays(const struct report_drawing *drawing, struct bode *panels)
+{
+    for (size_t r = 0; r < drawing->overlay_count; r++) {
+        add_overlay(&drawing->overlays[r], r, panels);
     }
 }
 
@@ -124,12 +124,12 @@ static void add_bode(const struct report_drawing *drawing, const struct frf_repo
                      struct figure *figure)
 {
     char label[figure_text_max];
-    snprintf(label, sizeof label, "magnitude in dB of 1 %s", units);
+    snprintf(label, sizeof label, "magnitude in dB, 0 dB is 1 %s", units);
     struct bode panels = {figure_add_panel(figure, label, axis_linear), NULL};
     panels.phase = figure_add_panel(figure, "phase in degrees", axis_degrees);
     panels.magnitude->height = 220;
     panels.phase->height = 140;
-    add_runs(drawing, options, &panels);
+    add_overlays(drawing, &panels);
     add_lines(drawing, options, &panels);
     add_curves(drawing, options, &panels);
 }
@@ -138,7 +138,7 @@ static void add_deviations(const struct report_drawing *drawing, const char *uni
 {
     const struct report_lines *lines = &drawing->lines;
     char label[figure_text_max];
-    snprintf(label, sizeof label, "standard deviation in dB of 1 %s", units);
+    snprintf(label, sizeof label, "standard deviation in dB, 0 dB is 1 %s", units);
     struct figure_panel *panel = figure_add_panel(figure, label, axis_linear);
     panel->height = 110;
     struct figure_series *total = figure_add_points(panel, lines->noise_differs ? "std, total" : "std", lines->count,
@@ -184,6 +184,27 @@ static void add_residuals(const struct report_drawing *drawing, const struct frf
     figure_add_limit(panel, "1: within 2 std", 1.0);
 }
 
+/// How far every run or other response is from the first.
+static void add_differences(const struct report_drawing *drawing, struct figure *figure)
+{
+    char label[figure_text_max];
+    snprintf(label, sizeof label, "difference over 2 std, from %s", drawing->first);
+    struct figure_panel *panel = figure_add_panel(figure, label, axis_log);
+    panel->height = 120;
+    for (size_t r = 0; r < drawing->overlay_count; r++) {
+        const struct report_overlay *overlay = &drawing->overlays[r];
+        if (drawing->runs_drawn > 0 && r == 0) {
+            continue; // the first itself
+        }
+        struct figure_series *points = figure_add_points(panel, overlay->name, overlay->lines.count,
+                                                         overlay->lines.frequency_hz, overlay->over_two_std);
+        points->colour = overlay_looks[r].colour;
+        points->marker = overlay_looks[r].marker;
+        points->size = overlay_size_px(overlay->lines.count);
+    }
+    figure_add_limit(panel, "1: within 2 std", 1.0);
+}
+
 /// What it was made of: periods, segments, or rows.
 static void write_amount(const struct frf *frf, char out_text[remark_size])
 {
@@ -199,10 +220,12 @@ static void write_amount(const struct frf *frf, char out_text[remark_size])
     }
 }
 
-static void write_delay(const struct frf *frf, const struct frf_report_options *options, char out_text[remark_size])
+static void write_delay(const struct frf *frf, const struct frf_report_options *options, double known_s,
+                        char out_text[remark_size])
 {
     const double removed_s = atof(estimate_key(frf, "delay_removed_s"));
-    const char *reason = options->delay_reason;
+    const char *held = options->known_delay_s > 0.0 ? NULL : "half a sample: the input is held between samples";
+    const char *reason = options->delay_reason ? options->delay_reason : held;
     size_t used = 0;
     out_text[0] = '\0';
     if (removed_s != 0.0) {
@@ -210,10 +233,10 @@ static void write_delay(const struct frf *frf, const struct frf_report_options *
                                 " A known delay of %.4g ms has been taken out of the response, here and in its file.",
                                 1e3 * removed_s);
     }
-    if (options->known_delay_s > 0.0) {
+    if (known_s > 0.0) {
         snprintf(out_text + used, remark_size - used,
-                 " The known delay of %.4g ms%s%s%s is taken out of the phase shown; the file has it.",
-                 1e3 * options->known_delay_s, reason ? " (" : "", reason ? reason : "", reason ? ")" : "");
+                 " The known delay of %.4g ms%s%s%s is taken out of the phase shown; the file has it.", 1e3 * known_s,
+                 reason ? " (" : "", reason ? reason : "", reason ? ")" : "");
     }
 }
 
@@ -223,13 +246,6 @@ static void write_degrees(const struct frf *frf, char out_text[remark_size])
     if (frf->degrees_of_freedom > 0.0) {
         snprintf(out_text, remark_size, ", with %.0f degrees of freedom", frf->degrees_of_freedom);
     }
-}
-
-/// Chance that noise moves a line by more than 2 std, which is an estimate itself: F(2, dof) above 4.
-static double chance_beyond(double degrees_of_freedom)
-{
-    const double pairs = 0.5 * degrees_of_freedom;
-    return pairs > 0.0 ? pow(1.0 + 4.0 / pairs, -pairs) : exp(-4.0);
 }
 
 static void add_smoothness(struct page *page, const struct smoothness *smoothness)
@@ -263,19 +279,24 @@ static void add_sentences(struct page *page, const struct frf *frf, const struct
     if (options->curve_count == 0 && !drawing->is_model) {
         add_smoothness(page, &drawing->smoothness);
     }
-    if (options->run_count > frf_report_runs_max) {
+    if (options->run_count > frf_report_overlays_max) {
         page_add_paragraph(page, "%zu runs are too many to be drawn one by one: the mean is shown.",
                            options->run_count);
     }
-    if (options->curve_count == 0) {
+    if (options->curve_count + drawing->overlay_count == 0) {
         return;
     }
     page_start_list(page);
+    for (size_t r = drawing->runs_drawn > 0; r < drawing->overlay_count; r++) {
+        char says[2 * remark_size];
+        difference_say(&drawing->overlays[r].difference, drawing->first, says, sizeof says);
+        page_add_item(page, drawing->overlays[r].name, "%s", says);
+    }
     for (size_t c = 0; c < options->curve_count; c++) {
         const struct report_curve *curve = &drawing->curves[c];
         page_add_item(page, options->curves[c].name,
                       "is off by more than 2 std at %zu of %zu lines; noise alone would do that at %.2g %% of them.",
-                      curve->beyond, curve->compared, 100.0 * chance_beyond(frf->degrees_of_freedom));
+                      curve->beyond, curve->compared, 100.0 * difference_chance(frf->degrees_of_freedom));
     }
     page_end_list(page);
 }
@@ -285,7 +306,7 @@ void frf_report_section(struct page *page, const struct frf *frf, const struct f
     static const struct frf_report_options none = {0};
     struct report_drawing drawing;
     struct figure figure;
-    char units[units_size];
+    char units[report_units_size];
     char delay[remark_size];
     char degrees[remark_size];
     options = options ? options : &none;
@@ -296,7 +317,7 @@ void frf_report_section(struct page *page, const struct frf *frf, const struct f
         return;
     }
     add_sentences(page, frf, &drawing, options);
-    readable_units(frf->units, units);
+    report_units(frf->units, units);
     figure_start(&figure, "frequency in Hz", axis_log);
     add_bode(&drawing, options, units, &figure);
     add_deviations(&drawing, units, &figure);
@@ -304,7 +325,10 @@ void frf_report_section(struct page *page, const struct frf *frf, const struct f
         add_coherence(&drawing, &figure);
     }
     add_residuals(&drawing, options, &figure);
-    write_delay(frf, options, delay);
+    if (drawing.overlay_count > 0) {
+        add_differences(&drawing, &figure);
+    }
+    write_delay(frf, options, drawing.known_delay_s, delay);
     write_degrees(frf, degrees);
     page_add_figure(page, &figure, "%s to %s; std is that of the complex value%s.%s", frf->input, frf->output, degrees,
                     delay);

@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/report_distortion.h"
 
+#include "lab/estimate/report_lines.h"
+
 #include <math.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 enum { curve_response, curve_noise, curve_total, curve_odd, curve_even, curve_thd, curve_count };
@@ -82,11 +85,15 @@ static void add_points(struct figure_panel *panel, const char *name, const struc
     points->marker = marker;
 }
 
-static void add_levels(struct page *page, const struct levels *levels)
+static void add_levels(struct page *page, const struct frf *frf, const struct levels *levels)
 {
     struct figure figure;
+    char units[report_units_size];
+    char label[figure_text_max];
+    report_units(frf->units, units);
+    snprintf(label, sizeof label, "level in dB, 0 dB is 1 %s", units);
     figure_start(&figure, "frequency in Hz", axis_log);
-    struct figure_panel *panel = figure_add_panel(&figure, "dB of one unit of the response", axis_linear);
+    struct figure_panel *panel = figure_add_panel(&figure, label, axis_linear);
     add_points(panel, "response", levels, curve_response, figure_blue, figure_circle);
     add_points(panel, levels->total_differs ? "std of the noise" : "std", levels, curve_noise, figure_grey,
                figure_cross);
@@ -131,7 +138,7 @@ void frf_report_distortion_section(struct page *page, const struct frf *frf, con
         return;
     }
     if (any_known(frf, NULL)) {
-        add_levels(page, &levels);
+        add_levels(page, frf, &levels);
     }
     if (thd_db) {
         add_harmonics(page, &levels);

@@ -10,7 +10,27 @@
 
 static const double two_pi = 6.283185307179586;
 
-enum { arrays_of_lines = 10, arrays_of_curve = 4 };
+enum { arrays_of_lines = 10, arrays_of_curve = 4, arrays_of_overlay = arrays_of_lines + 1 };
+
+void report_units(const char *units, char out_text[report_units_size])
+{
+    const char *over = strchr(units, '/');
+    const size_t numerator = over ? (size_t)(over - units) : strlen(units);
+    const bool compound = over && memchr(units, '_', numerator);
+    size_t used = 0;
+    for (const char *at = units; *at && used + 4 < report_units_size;) {
+        if (at == units && compound) {
+            out_text[used++] = '(';
+        }
+        if (at == over && compound) {
+            out_text[used++] = ')';
+        }
+        const bool per = strncmp(at, "_per_", 5) == 0;
+        out_text[used++] = per ? '/' : *at;
+        at += per ? 5 : 1;
+    }
+    out_text[used] = '\0';
+}
 
 static double decibel(double magnitude)
 {
@@ -78,8 +98,26 @@ static void align_run(const struct report_lines *whole, struct report_lines *io_
         while (k + 1 < whole->count && whole->frequency_hz[k] < io_run->frequency_hz[i] * (1.0 - 1e-3)) {
             k++;
         }
-        io_run->phase_deg[i] -= 360.0 * round((io_run->phase_deg[i] - whole->phase_deg[k]) / 360.0);
+        const double turn = 360.0 * round((io_run->phase_deg[i] - whole->phase_deg[k]) / 360.0);
+        io_run->phase_deg[i] -= turn;
+        io_run->phase_low_deg[i] -= turn;
+        io_run->phase_high_deg[i] -= turn;
     }
+}
+
+/// The distances of the valid lines, close together.
+static bool compare_overlay(const struct frf *first, struct report_overlay *io)
+{
+    size_t k = 0;
+    if (!difference_measure(first, io->frf, io->over_two_std, &io->difference)) {
+        return false;
+    }
+    for (size_t line = 0; line < io->frf->count; line++) {
+        if (io->frf->valid[line]) {
+            io->over_two_std[k++] = io->over_two_std[line];
+        }
+    }
+    return true;
 }
 
 /// Both lists ascend, so one pass finds the equal frequencies.
@@ -160,14 +198,15 @@ static void take_arrays(double **io_free, size_t count, struct report_lines *out
     }
 }
 
-static size_t numbers_needed(const struct frf *frf, const struct frf_report_options *options, size_t run_count)
+static size_t numbers_needed(const struct frf *frf, const struct frf_report_options *options,
+                             const struct report_drawing *drawing)
 {
     size_t needed = frf->count * (arrays_of_lines + 2 + options->curve_count);
     for (size_t c = 0; c < options->curve_count; c++) {
         needed += arrays_of_curve * options->curves[c].count;
     }
-    for (size_t r = 0; r < run_count; r++) {
-        needed += arrays_of_lines * options->runs[r].count;
+    for (size_t r = 0; r < drawing->overlay_count; r++) {
+        needed += arrays_of_overlay * drawing->overlays[r].frf->count;
     }
     return needed + 1;
 }
@@ -194,12 +233,60 @@ static bool compare_neighbours(const struct frf *frf, struct report_drawing *io)
     return true;
 }
 
+double frf_report_known_delay_s(const struct frf *frf)
+{
+    const double rate_hz = atof(estimate_key(frf, "sample_rate_hz"));
+    const bool held = strcmp(estimate_key(frf, "hold"), "zoh") == 0;
+    const bool removed = estimate_key(frf, "delay_removed_s")[0] != '\0';
+    return held && !removed && rate_hz > 0.0 ? 0.5 / rate_hz : 0.0;
+}
+
+static double delay_of(const struct frf *frf, const struct frf_report_options *options)
+{
+    return options->known_delay_s > 0.0 ? options->known_delay_s : frf_report_known_delay_s(frf);
+}
+
+static bool is_model(const struct frf *frf)
+{
+    return frf->method && strcmp(frf->method, "parametric") == 0;
+}
+
+/// All runs or none, then as many others as there is room for.
+static void take_names(const struct frf_report_options *options, struct report_drawing *out)
+{
+    const size_t runs =
+        options->run_count > 1 && options->run_count <= frf_report_overlays_max ? options->run_count : 0;
+    for (size_t r = 0; r < runs; r++) {
+        out->overlays[out->overlay_count++] =
+            (struct report_overlay){.frf = &options->runs[r], .name = options->run_names[r]};
+    }
+    out->runs_drawn = runs;
+    for (size_t r = 0; r < options->other_count && out->overlay_count < frf_report_overlays_max; r++) {
+        out->overlays[out->overlay_count++] =
+            (struct report_overlay){.frf = &options->others[r], .name = options->other_names[r]};
+    }
+    out->first = runs > 0 ? options->run_names[0] : options->name ? options->name : "measured";
+}
+
+static bool take_overlay(const struct frf *first, bool of_the_response, const struct frf_report_options *options,
+                         double **io_free, const struct report_drawing *drawing, struct report_overlay *io)
+{
+    take_arrays(io_free, io->frf->count, &io->lines);
+    io->over_two_std = take(io_free, io->frf->count);
+    io->is_model = is_model(io->frf);
+    take_lines(io->frf, drawing->factor, of_the_response ? drawing->known_delay_s : delay_of(io->frf, options),
+               &io->lines);
+    align_run(&drawing->lines, &io->lines);
+    return io->frf == first || compare_overlay(first, io);
+}
+
 bool report_drawing_make(const struct frf *frf, const struct frf_report_options *options, struct report_drawing *out)
 {
     memset(out, 0, sizeof *out);
-    out->run_count = options->run_count <= frf_report_runs_max ? options->run_count : 0;
-    out->is_model = frf->method && strcmp(frf->method, "parametric") == 0;
-    out->memory = malloc(numbers_needed(frf, options, out->run_count) * sizeof *out->memory);
+    take_names(options, out);
+    out->is_model = is_model(frf);
+    out->known_delay_s = delay_of(frf, options);
+    out->memory = malloc(numbers_needed(frf, options, out) * sizeof *out->memory);
     if (!out->memory) {
         return false;
     }
@@ -208,11 +295,11 @@ bool report_drawing_make(const struct frf *frf, const struct frf_report_options 
     out->at_lines = take(&rest, frf->count);
     out->over_two_std = take(&rest, frf->count);
     find_factor(frf, out);
-    take_lines(frf, out->factor, options->known_delay_s, &out->lines);
-    for (size_t r = 0; r < out->run_count; r++) {
-        take_arrays(&rest, options->runs[r].count, &out->runs[r]);
-        take_lines(&options->runs[r], out->factor, options->known_delay_s, &out->runs[r]);
-        align_run(&out->lines, &out->runs[r]);
+    take_lines(frf, out->factor, out->known_delay_s, &out->lines);
+    bool done = true;
+    for (size_t r = 0; r < out->overlay_count && done; r++) {
+        done = take_overlay(out->runs_drawn > 0 ? &options->runs[0] : frf, r < out->runs_drawn, options, &rest, out,
+                            &out->overlays[r]);
     }
     for (size_t c = 0; c < options->curve_count; c++) {
         struct report_curve *curve = &out->curves[c];
@@ -221,9 +308,9 @@ bool report_drawing_make(const struct frf *frf, const struct frf_report_options 
         curve->high_db = take(&rest, options->curves[c].count);
         curve->phase_deg = take(&rest, options->curves[c].count);
         curve->over_two_std = take(&rest, frf->count);
-        take_curve(frf, &options->curves[c], options->known_delay_s, out, curve);
+        take_curve(frf, &options->curves[c], out->known_delay_s, out, curve);
     }
-    return options->curve_count > 0 || compare_neighbours(frf, out);
+    return done && (options->curve_count > 0 || compare_neighbours(frf, out));
 }
 
 void report_drawing_free(struct report_drawing *self)

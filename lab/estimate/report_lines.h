@@ -4,6 +4,7 @@
 #ifndef SERVOSCOPE_ESTIMATE_REPORT_LINES_H
 #define SERVOSCOPE_ESTIMATE_REPORT_LINES_H
 
+#include "lab/estimate/difference.h"
 #include "lab/estimate/report.h"
 #include "lab/estimate/smoothness.h"
 
@@ -27,6 +28,16 @@ struct report_curve {
     size_t compared, beyond;
 };
 
+/// A run, or another response, beside the one that the section is about.
+struct report_overlay {
+    const struct frf *frf;
+    const char *name;
+    bool is_model; ///< of method parametric
+    struct report_lines lines;
+    double *over_two_std; ///< of each valid line: distance from the first over 2 std of the difference
+    struct difference difference;
+};
+
 struct report_drawing {
     double *memory;
     double factor;        ///< of std, what the regions shown reach to
@@ -36,10 +47,18 @@ struct report_drawing {
     double *over_two_std; ///< of each valid line against its neighbours, where there is no model
     struct smoothness smoothness;
     struct report_lines lines;
-    struct report_lines runs[frf_report_runs_max];
-    size_t run_count;
+    size_t overlay_count;
+    size_t runs_drawn; ///< the first so many overlays are runs of the response
+    struct report_overlay overlays[frf_report_overlays_max];
+    const char *first;    ///< the name of what the overlays are compared with
+    double known_delay_s; ///< taken out of the response's phases
     struct report_curve curves[frf_report_curves_max];
 };
+
+enum { report_units_size = 56 };
+
+/// "rad_per_s/Nm" as a person writes it: "(rad/s)/Nm".
+void report_units(const char *units, char out_text[report_units_size]);
 
 /// Errors: false if memory is short; report_drawing_free() in every case
 bool report_drawing_make(const struct frf *frf, const struct frf_report_options *options, struct report_drawing *out);

@@ -3,6 +3,7 @@
 
 #include "lab/estimate/frf_lpm_arbitrary.h"
 #include "lab/estimate/method.h"
+#include "lab/numeric/cmplx.h"
 
 #include <complex.h>
 #include <math.h>

@@ -2,6 +2,7 @@
 #include "lab/estimate/setup.h"
 
 #include "lab/estimate/method.h"
+#include "lab/numeric/cmplx.h"
 
 #include <complex.h>
 #include <string.h>

@@ -2,6 +2,7 @@
 #include "lab/estimate/smoothness.h"
 
 #include "lab/estimate/complex_fit.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include <complex.h>

@@ -2,6 +2,7 @@
 #include "lab/estimate/stretch.h"
 
 #include "lab/estimate/spectra.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/fft.h"
 
 #include <math.h>

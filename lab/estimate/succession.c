@@ -2,6 +2,7 @@
 #include "lab/estimate/succession.h"
 
 #include "lab/estimate/stretch.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include <complex.h>
@@ -159,7 +160,6 @@ static void judge(const struct products *products, struct succession *io_self)
         const double r = fmin(own[block], correlation_max);
         const double usual = sqrt(squares[block] / (double)tried);
         const bool enlarges = io_self->certain && r > notable * usual;
-        io_self->block_correlation[block] = own[block];
         io_self->factor[block] = enlarges ? sqrt((1.0 + r) / (1.0 - r)) : 1.0;
     }
 }

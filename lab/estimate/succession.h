@@ -20,7 +20,6 @@ struct succession {
     bool certain;
     size_t block_lines; ///< consecutive lines that are judged together
     size_t block_count;
-    double block_correlation[succession_blocks];
     double factor[succession_blocks]; ///< by which the standard deviation is too small; 1 unless `certain`
 };
 

@@ -18,7 +18,7 @@ static const fft_code *best_code()
 }
 
 // Longer ones have no place in any memory, and their indices none in the tables.
-static const size_t longest_length = size_t(1) << 32;
+static const size_t longest_length = size_t(1) << (sizeof(size_t) > 4 ? 32 : 26);
 
 // Time per point, in nanoseconds on a processor of 2022. Only which of two ways is the shorter matters.
 struct cost {

@@ -183,11 +183,6 @@ double statistics_f_quantile(double probability, double d1, double d2)
     return bisect_quantile(statistics_f_cdf, statistics_f_tail, probability, d1, d2);
 }
 
-double statistics_normal_cdf(double x)
-{
-    return 0.5 * erfc(-x / sqrt(2.0));
-}
-
 static double middle_of(double a, double b, double c)
 {
     const double low = a < b ? a : b;

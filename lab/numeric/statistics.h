@@ -28,9 +28,6 @@ double statistics_f_tail(double x, double d1, double d2);
 double statistics_chi2_quantile(double probability, double dof);
 double statistics_f_quantile(double probability, double d1, double d2);
 
-/// Returns P(X <= x) of the standard normal distribution.
-double statistics_normal_cdf(double x);
-
 /// Returns the median (mean of the two middle values for an even count); reorders `values`. NaN if count is 0.
 double statistics_median(double *values, size_t count);
 

@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-double simulated_drive_period_s(const struct simulated_drive *self)
+static double period_s(const struct simulated_drive *self)
 {
     return 1.0 / self->model.sample_rate_hz;
 }
@@ -83,7 +83,7 @@ static int32_t limited_position(struct simulated_drive *self)
     int64_t target = clipped(o->target_position, o->position_min, o->position_max, &self->limited);
     if (o->max_velocity == 0)
         return (int32_t)target;
-    double limit = o->max_velocity * self->scaling.velocity * simulated_drive_period_s(self) / self->scaling.position;
+    double limit = o->max_velocity * self->scaling.velocity * period_s(self) / self->scaling.position;
     int64_t step = (int64_t)fmin(limit, 4e9) + 1; // one count more: the set-points themselves are rounded
     int64_t from = self->followed_position;
     return (int32_t)clipped(target, from - step, from + step, &self->limited); // between two 32-bit numbers
@@ -100,7 +100,7 @@ static double limited_velocity(struct simulated_drive *self, int64_t velocity)
 /// One sample further along the slope (6087) towards the target, in permille.
 static double next_profile_torque(struct simulated_drive *self)
 {
-    double step = self->objects.torque_slope * simulated_drive_period_s(self);
+    double step = self->objects.torque_slope * period_s(self);
     double to_go = self->objects.target_torque - self->profile_torque;
     self->profile_torque =
         fabs(to_go) <= step ? self->objects.target_torque : self->profile_torque + copysign(step, to_go);
@@ -180,8 +180,7 @@ static void follow_stop(struct simulated_drive *self)
         return;
     self->stopping_samples++;
     const double longest_s = 0.1;
-    if (!(fabs(self->sample.velocity) <= still_speed(self)) &&
-        self->stopping_samples * simulated_drive_period_s(self) < longest_s)
+    if (!(fabs(self->sample.velocity) <= still_speed(self)) && self->stopping_samples * period_s(self) < longest_s)
         return;
     self->stood_still = true;
     cia402_machine_stood_still(&self->machine);
@@ -199,7 +198,7 @@ static void watch_following_error(struct simulated_drive *self)
         return;
     }
     self->following_samples++;
-    if (self->following_samples * simulated_drive_period_s(self) * 1e3 > o->following_error_timeout_ms)
+    if (self->following_samples * period_s(self) * 1e3 > o->following_error_timeout_ms)
         simulated_drive_detect(self, emcy_following_error, emcy_profile_specific, simulated_reaction_by_option);
 }
 
@@ -232,7 +231,7 @@ static void watch_motion(struct simulated_drive *self)
         return;
     }
     self->blocked_samples++;
-    if (o->blocked_time_ms != 0 && self->blocked_samples * simulated_drive_period_s(self) * 1e3 > o->blocked_time_ms)
+    if (o->blocked_time_ms != 0 && self->blocked_samples * period_s(self) * 1e3 > o->blocked_time_ms)
         simulated_drive_detect(self, emcy_motor_blocked, emcy_profile_specific, simulated_reaction_coast);
 }
 

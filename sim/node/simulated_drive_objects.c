@@ -122,40 +122,26 @@ static uint32_t write_period(void *owner, const struct od_entry *entry, int64_t 
     return od_abort_none;
 }
 
-#define AT(member) offsetof(struct simulated_drive, member)
-#define CONSTANT(index, sub, type, value)                                                                              \
-    {                                                                                                                  \
-        index, sub, type, od_readable | od_constant, 0, value, NULL                                                    \
-    }
-#define READ_ONLY(index, sub, type, member)                                                                            \
-    {                                                                                                                  \
-        index, sub, type, od_readable, AT(member), 0, NULL                                                             \
-    }
+#define READ_ONLY(index, sub, type, member) OD_ENTRY(index, sub, type, od_readable, simulated_drive, member, NULL)
 #define WRITABLE(index, sub, type, member, write)                                                                      \
-    {                                                                                                                  \
-        index, sub, type, od_readable | od_writable, AT(member), 0, write                                              \
-    }
+    OD_ENTRY(index, sub, type, od_readable | od_writable, simulated_drive, member, write)
 #define TARGET(index, type, member, write)                                                                             \
-    {                                                                                                                  \
-        index, 0, type, od_readable | od_writable | od_mappable_receive, AT(objects.member), 0, write                  \
-    }
+    OD_ENTRY(index, 0, type, od_readable | od_writable | od_mappable_receive, simulated_drive, objects.member, write)
 #define ACTUAL(index, type, member)                                                                                    \
-    {                                                                                                                  \
-        index, 0, type, od_readable | od_mappable_transmit, AT(objects.member), 0, NULL                                \
-    }
+    OD_ENTRY(index, 0, type, od_readable | od_mappable_transmit, simulated_drive, objects.member, NULL)
 #define OPTION(index, member) WRITABLE(index, 0, od_i16, machine.options.member, write_option)
 
 const struct od_entry simulated_drive_entries[] = {
-    CONSTANT(0x2000, 0, od_u8, 6),
+    OD_CONSTANT(0x2000, 0, od_u8, 6),
     READ_ONLY(0x2000, 1, od_u32, objects.saturated),
     READ_ONLY(0x2000, 2, od_u32, node.errors.targets_lost),
     READ_ONLY(0x2000, 3, od_u32, node.errors.targets_rejected),
     READ_ONLY(0x2000, 4, od_u32, node.sync.missed),
     READ_ONLY(0x2000, 5, od_u32, node.errors.values_refused),
     READ_ONLY(0x2000, 6, od_u32, commands_refused),
-    CONSTANT(0x2003, 0, od_u8, 1),
+    OD_CONSTANT(0x2003, 0, od_u8, 1),
     WRITABLE(0x2003, 1, od_u32, node.sync.timeout_us, NULL),
-    CONSTANT(0x2004, 0, od_u8, 2),
+    OD_CONSTANT(0x2004, 0, od_u8, 2),
     WRITABLE(0x2004, 1, od_u16, objects.blocked_torque, NULL),
     WRITABLE(0x2004, 2, od_u16, objects.blocked_time_ms, NULL),
     OPTION(cia402_abort_connection_option, abort_connection),
@@ -179,7 +165,7 @@ const struct od_entry simulated_drive_entries[] = {
     READ_ONLY(cia402_rated_torque, 0, od_u32, objects.rated_torque),
     ACTUAL(cia402_torque_actual, od_i16, torque_actual),
     TARGET(cia402_target_position, od_i32, target_position, NULL),
-    CONSTANT(cia402_position_limit, 0, od_u8, 2),
+    OD_CONSTANT(cia402_position_limit, 0, od_u8, 2),
     WRITABLE(cia402_position_limit, 1, od_i32, objects.position_min, write_position_limit),
     WRITABLE(cia402_position_limit, 2, od_i32, objects.position_max, write_position_limit),
     WRITABLE(cia402_max_velocity, 0, od_u32, objects.max_velocity, NULL),
@@ -187,7 +173,7 @@ const struct od_entry simulated_drive_entries[] = {
     WRITABLE(cia402_profile_deceleration, 0, od_u32, objects.profile_deceleration, write_ramp),
     WRITABLE(cia402_quick_stop_deceleration, 0, od_u32, objects.quick_stop_deceleration, write_ramp),
     WRITABLE(cia402_torque_slope, 0, od_u32, objects.torque_slope, write_ramp),
-    CONSTANT(cia402_encoder_resolution, 0, od_u8, 2),
+    OD_CONSTANT(cia402_encoder_resolution, 0, od_u8, 2),
     READ_ONLY(cia402_encoder_resolution, 1, od_u32, objects.increments),
     READ_ONLY(cia402_encoder_resolution, 2, od_u32, objects.revolutions),
     READ_ONLY(cia402_unit_position, 0, od_u32, objects.unit_position),
@@ -195,7 +181,7 @@ const struct od_entry simulated_drive_entries[] = {
     READ_ONLY(cia402_unit_acceleration, 0, od_u32, objects.unit_acceleration),
     TARGET(cia402_velocity_offset, od_i32, velocity_offset, NULL),
     TARGET(cia402_torque_offset, od_i16, torque_offset, NULL),
-    CONSTANT(cia402_interpolation_period, 0, od_u8, 2),
+    OD_CONSTANT(cia402_interpolation_period, 0, od_u8, 2),
     WRITABLE(cia402_interpolation_period, 1, od_u8, objects.period_units, write_period),
     WRITABLE(cia402_interpolation_period, 2, od_i8, objects.period_exponent, write_period),
     ACTUAL(cia402_following_error_actual, od_i32, following_error_actual),

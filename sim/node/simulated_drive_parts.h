@@ -31,7 +31,6 @@ extern const size_t simulated_drive_entry_count;
 /// Whether the motor turns, as far as it is measured.
 bool simulated_drive_is_moving(const struct simulated_drive *self);
 
-double simulated_drive_period_s(const struct simulated_drive *self);
 uint32_t simulated_drive_period_us(const struct simulated_drive *self);
 
 #endif

@@ -11,16 +11,10 @@ import time
 import canopen
 from canopen.profiles.p402 import BaseNode402, State402
 
+from checks import check, failures
+
 NODE = 5
 PERIOD_MS = 10
-failures = 0
-
-
-def check(condition, text):
-    global failures
-    if not condition:
-        failures += 1
-        print(f"FAILED: {text}", file=sys.stderr)
 
 
 def count_uploads(network):
