@@ -197,8 +197,7 @@ void sim_belt_drive_step(struct sim_belt_drive *self, const struct sim_command *
     sim_actuator_hold(&self->actuator, out_sample->torque_ref);
     out_sample->torque = sim_actuator_now(&self->actuator, &self->stepper) + noise.torque;
     for (size_t i = 0; i < sim_substeps; i++) {
-        double torque = sim_actuator_substep(&self->actuator, &self->stepper, i) + noise.process;
-        sim_plant_move(&self->plant, &self->stepper, torque);
+        sim_plant_drive(&self->plant, &self->stepper, &self->actuator, i, noise.process);
         if (model->has_end_stops)
             hold_at_end_stops(self);
     }

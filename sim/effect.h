@@ -72,6 +72,8 @@ struct sim_parameter {
     double linear_minimum, linear_maximum;
     bool optional; ///< a model file may leave it out: then it is `usual`
     double usual;
+    /// Not 0: it is 0 or 1 by how the drive is made, give or take this. Where the data say little of it, that counts.
+    double near_whole;
     /// For effects that are parameters of the base model: offset of the double in struct sim_model; else SIZE_MAX.
     size_t model_offset;
 };

@@ -392,22 +392,22 @@ static bool slide(struct state *io, const struct sim_stepper *stepper, double to
     return true;
 }
 
-static void step_finely(struct state *io, const struct sim_stepper *stepper, double torque)
+static void step_finely(struct state *io, const struct sim_stepper *stepper, double torque, double whole_s)
 {
     bool bent = stepper->bend.count > 0;
     double dry = 0.0;
-    size_t steps = bent ? sim_stepper_inner_steps(bent_rate(io, stepper), stepper->dt_s) : stepper->inner_steps;
+    size_t steps = bent ? sim_stepper_inner_steps(bent_rate(io, stepper), whole_s) : stepper->inner_steps;
     if (stepper->build_up > 0.0) {
         dry = dry_level(io, stepper, sign_of(io->velocity[0]));
-        if (!bent && steps == 1 && slide(io, stepper, torque, dry, stepper->dt_s))
+        if (!bent && steps == 1 && slide(io, stepper, torque, dry, whole_s))
             return;
-        size_t swings = sim_stepper_inner_steps(bristle_rate(io, stepper, dry), stepper->dt_s);
+        size_t swings = sim_stepper_inner_steps(bristle_rate(io, stepper, dry), whole_s);
         // Looking ahead, friction that builds up within a fraction of a step is as good as friction that switches.
         const size_t quick_most = 8;
         swings = stepper->quick && swings > quick_most ? quick_most : swings;
         steps = swings > steps ? swings : steps;
     }
-    double dt_s = stepper->dt_s / (double)steps;
+    double dt_s = whole_s / (double)steps;
     for (size_t i = 0; i < steps; i++) {
         if (bent)
             step_belt(io, stepper, torque, dt_s);
@@ -503,13 +503,68 @@ static bool step_at_once(struct state *io, const struct sim_stepper *stepper, do
     return true;
 }
 
+static void move(struct state *io, const struct sim_stepper *stepper, double torque)
+{
+    if (!stepper->split || !step_at_once(io, stepper, torque))
+        step_finely(io, stepper, torque, stepper->dt_s);
+}
+
 void sim_plant_move(struct sim_plant *self, const struct sim_stepper *stepper, double torque)
 {
     struct state s = {.time_s = self->time_s};
     take(self, stepper, &s);
-    if (!stepper->split || !step_at_once(&s, stepper, torque))
-        step_finely(&s, stepper, torque);
+    move(&s, stepper, torque);
     give(&s, stepper, self);
+}
+
+/// Moves the motor by what `torque` over a whole step would be off by; dampers hand on an impulse meanwhile.
+static void shift(struct state *io, const struct sim_stepper *stepper, double torque)
+{
+    const struct sim_chain *c = &stepper->chain;
+    if (io->velocity[0] == 0.0)
+        return; // what friction holds stays
+    double way = torque * stepper->dt_s * stepper->dt_s / c->inertia[0];
+    if (c->masses > 1 && (stepper->bend.count == 0 || !hangs_loose(io, stepper))) {
+        io->velocity[0] -= c->damping[0] * way / c->inertia[0];
+        io->velocity[1] += c->damping[0] * way / c->inertia[1];
+    }
+    io->position[0] += way;
+}
+
+/// A step in which the motor comes to rest or sets off: when it does depends on the torque's course, which is taken for
+/// a straight line with the mean and the first moment that it has.
+static void move_in_parts(struct state *io, const struct sim_stepper *stepper, const struct sim_torque *torque)
+{
+    enum { parts = 4 };
+    double rise = -12.0 * (torque->before + torque->after);
+    for (int i = 0; i < parts; i++) {
+        double part = ((double)i + 0.5) / parts - 0.5;
+        step_finely(io, stepper, torque->mean + part * rise, stepper->dt_s / parts);
+    }
+}
+
+void sim_plant_move_under(struct sim_plant *self, const struct sim_stepper *stepper, const struct sim_torque *torque)
+{
+    struct state from = {.time_s = self->time_s}, s;
+    take(self, stepper, &from);
+    s = from;
+    shift(&s, stepper, torque->before);
+    move(&s, stepper, torque->mean);
+    shift(&s, stepper, torque->after);
+    if (sign_of(s.velocity[0]) != sign_of(from.velocity[0]) && (torque->before != 0.0 || torque->after != 0.0)) {
+        s = from;
+        move_in_parts(&s, stepper, torque);
+    }
+    give(&s, stepper, self);
+}
+
+void sim_plant_drive(struct sim_plant *self, const struct sim_stepper *stepper, struct sim_actuator *actuator,
+                     size_t index, double torque)
+{
+    sim_actuator_substep(actuator, stepper, index);
+    struct sim_torque all = actuator->last;
+    all.mean += torque;
+    sim_plant_move_under(self, stepper, &all);
 }
 
 void sim_plant_step(struct sim_plant *self, const struct sim_model *model, double torque, double dt_s)

@@ -20,11 +20,21 @@ struct sim_plant {
     double time_s;
 };
 
+/// Torque over one step. Where a reference begins to act within it, or lags, the motor is not where a constant torque
+/// would have taken it: next to nothing for the motor, but a load near its antiresonance swings with that. Shifts
+/// by `before` ahead of the step and by `after` behind it, times T^2 / J, leave it there and pull the belt as much.
+/// Equation:  before = I2 / T^3, before + after = I1 / T^2,  I1 = integral (T - t)(torque - mean) dt,
+///            I2 = integral (T - t)^2 / 2 (torque - mean) dt over a step of length T
+struct sim_torque {
+    double mean, before, after; ///< Nm
+};
+
 /// Torque command to torque: dead time (fractions of a sample too), first-order lag, limit.
 struct sim_actuator {
     double held[sim_actuator_history]; ///< the last references, newest at `newest`
     size_t newest;
-    double torque; ///< state of the lag, Nm
+    double torque;          ///< state of the lag, Nm
+    struct sim_torque last; ///< over the last substep
 };
 
 /// At rest, everything in one place, friction unloaded.
@@ -35,6 +45,13 @@ void sim_plant_init(struct sim_plant *self, double position);
 /// friction need. Instants at which the motor comes to rest are located, so are those at which a belt goes slack or
 /// tight.
 void sim_plant_move(struct sim_plant *self, const struct sim_stepper *stepper, double torque);
+
+/// The same under a torque that changes meanwhile.
+void sim_plant_move_under(struct sim_plant *self, const struct sim_stepper *stepper, const struct sim_torque *torque);
+
+/// Moves over substep `index` of a sample under what the actuator makes, and `torque` beside it that is constant.
+void sim_plant_drive(struct sim_plant *self, const struct sim_stepper *stepper, struct sim_actuator *actuator,
+                     size_t index, double torque);
 
 /// The same for a single step of any width.
 void sim_plant_step(struct sim_plant *self, const struct sim_model *model, double torque, double dt_s);

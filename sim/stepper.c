@@ -89,8 +89,13 @@ static void prepare_actuator(struct sim_stepper *self)
         part[0] = (struct sim_actuator_part){.ago = (size_t)-floor(from), .samples = (split ? change : to) - from};
         part[1] = (struct sim_actuator_part){.ago = (size_t)fmax(-change, 0.0), .samples = to - change};
         self->part_count[i] = split ? 2 : 1;
-        for (size_t j = 0; j < self->part_count[i]; j++)
-            part[j].approach = self->lag_samples > 0.0 ? -expm1(-part[j].samples / self->lag_samples) : 1.0;
+        for (size_t j = 0; j < self->part_count[i]; j++) {
+            double lag = self->lag_samples, span = part[j].samples;
+            part[j].approach = lag > 0.0 ? -expm1(-span / lag) : 1.0;
+            part[j].fading[0] = lag * part[j].approach;
+            part[j].fading[1] = lag * (span - part[j].fading[0]);
+            part[j].fading[2] = lag * (0.5 * span * span - part[j].fading[1]);
+        }
     }
 }
 

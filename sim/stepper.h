@@ -28,9 +28,10 @@ struct sim_transition {
 
 /// One piece of a substep during which the delayed reference is constant.
 struct sim_actuator_part {
-    size_t ago;      ///< how many references ago this one began to hold
-    double samples;  ///< how long
-    double approach; ///< share of the way to it that the lag goes meanwhile
+    size_t ago;       ///< how many references ago this one began to hold
+    double samples;   ///< how long
+    double approach;  ///< share of the way to it that the lag goes meanwhile
+    double fading[3]; ///< of what the lag has to go: the integrals over it of 1, (end - t), (end - t)^2 / 2
 };
 
 /// Indices in sim_effects of the effects that are on and have one of the hooks.

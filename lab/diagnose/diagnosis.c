@@ -2,8 +2,10 @@
 #include "lab/diagnose/diagnosis.h"
 
 #include "lab/diagnose/blackbox.h"
+#include "lab/diagnose/cause_gain.h"
 #include "lab/diagnose/gain.h"
 #include "lab/diagnose/gain_tie.h"
+#include "lab/diagnose/held_back.h"
 #include "lab/diagnose/hidden_mass.h"
 #include "lab/diagnose/hold.h"
 #include "lab/diagnose/inertia_guess.h"
@@ -27,8 +29,7 @@ struct work {
     struct recording *recordings; ///< fit runs, then validation runs
     struct evidence *evidence;    ///< likewise
     struct fit_data fit_data, validate_data;
-    struct run parts[2]; ///< of a run of which a part is held back; columns borrow the run's values
-    size_t held_from;    ///< row at which the part begins that is held back
+    struct held_back parts; ///< of the only run
     struct fit fit;
     struct search_memo memo; ///< of fit_data
     struct repeat repeat;    ///< of the fit's parameters, on the validation data
@@ -44,40 +45,8 @@ static void work_free(struct work *w)
     }
     free(w->evidence);
     free(w->recordings);
-    free(w->parts[0].columns);
-    free(w->parts[1].columns);
+    held_back_free(&w->parts);
     fit_free(&w->fit);
-}
-
-/// A view of rows from .. from + rows of a run.
-static bool run_part(const struct run *run, size_t from, size_t rows, size_t settle_periods, struct run *out)
-{
-    *out = *run;
-    out->rows = rows;
-    out->columns = malloc(run->column_count * sizeof *out->columns);
-    if (!out->columns)
-        return false;
-    for (size_t i = 0; i < run->column_count; i++)
-        out->columns[i] = (struct run_column){run->columns[i].name, run->columns[i].data + from};
-    out->periods = 0;
-    out->settle_periods = settle_periods;
-    out->has_settle_periods = settle_periods > 0;
-    return true;
-}
-
-/// Splits the only run: two thirds to fit, one third to validate; by whole periods if it has at least six counted ones.
-static bool hold_back(const struct run *run, struct work *w)
-{
-    size_t n = run->period_samples;
-    if (n >= 16 && run->rows >= 7 * n) {
-        size_t periods = run->rows / n, settle = run->settle_periods > 0 ? run->settle_periods : 1;
-        size_t counted = periods - settle, held = counted / 3;
-        size_t from = (periods - held - 1) * n; // one period more, to lead into the first that counts
-        return run_part(run, 0, (periods - held) * n, settle, &w->parts[0]) &&
-               run_part(run, w->held_from = from, (held + 1) * n, 1, &w->parts[1]);
-    }
-    size_t rows = w->held_from = run->rows / 3 * 2;
-    return run_part(run, 0, rows, 0, &w->parts[0]) && run_part(run, rows, run->rows - rows, 0, &w->parts[1]);
 }
 
 static int check_alike(const struct run *run, const struct recording *r, const struct run *first_run,
@@ -114,7 +83,7 @@ static int prepare_one(const struct diagnosis_request *request, struct work *w, 
 {
     const struct run *run = i < w->fit_count ? &request->fit[i] : &request->validate[i - w->fit_count];
     if (held_back && (i == 0 || i == w->fit_count))
-        run = &w->parts[i == 0 ? 0 : 1];
+        run = i == 0 ? &w->parts.fitted : &w->parts.judged;
     struct run alike = *run;
     bool one_rate = share_rate(&request->fit[0], &alike);
     int status = recording_prepare(&alike, &w->recordings[i], out_error);
@@ -124,7 +93,7 @@ static int prepare_one(const struct diagnosis_request *request, struct work *w, 
         oddities_add(&w->recordings[i].oddities, "%s: sampled at %.8g Hz, the first run at %.8g Hz: taken as the same.",
                      run->path, run->sample_rate_hz, alike.sample_rate_hz);
     if (held_back && i == w->fit_count)
-        recording_begin(&w->recordings[i], (double)w->held_from / run->sample_rate_hz);
+        recording_begin(&w->recordings[i], (double)w->parts.from / run->sample_rate_hz);
     return check_alike(run, &w->recordings[i], &request->fit[0], &w->recordings[0], out_error);
 }
 
@@ -137,7 +106,7 @@ static int prepare_recordings(const struct diagnosis_request *request, struct wo
     size_t count = w->fit_count + w->validate_count;
     w->recordings = calloc(count, sizeof *w->recordings);
     w->evidence = calloc(count, sizeof *w->evidence);
-    if (!w->recordings || !w->evidence || (d->held_back && !hold_back(&request->fit[0], w)))
+    if (!w->recordings || !w->evidence || (d->held_back && !held_back_split(&request->fit[0], &w->parts)))
         return error_set(out_error, error_refused, "not enough memory");
     for (size_t i = 0; i < count; i++) {
         int status = prepare_one(request, w, d->held_back, i, out_error);
@@ -258,10 +227,23 @@ static void choose_gain(struct work *w, struct diagnosis *d)
                      d->linear ? "masses" : "inertias", d->input_unit);
 }
 
+/// How columns got their names where nobody said it.
+static void say_names(const struct diagnosis_request *request, struct diagnosis *d)
+{
+    for (size_t i = 0; i < request->fit_count + request->validate_count; i++) {
+        const struct run *run = i < request->fit_count ? &request->fit[i] : &request->validate[i - request->fit_count];
+        const char *names = run_key(run, "columns_named"), *first = run_key(&request->fit[0], "columns_named");
+        if (names && (i == 0 || !first || strcmp(names, first) != 0))
+            oddities_add(&d->oddities, "%s: columns were named by the units in their names: --map %s", run->path,
+                         names);
+    }
+}
+
 /// What is odd about the recordings, and whether they can be of the drive that the model is of.
 static int look_at_oddities(const struct diagnosis_request *request, const struct work *w, struct diagnosis *d,
                             struct error *out_error)
 {
+    say_names(request, d);
     for (size_t i = 0; i < w->fit_count + w->validate_count; i++) {
         if (d->held_back && i == w->fit_count)
             continue; // of the same run as the first
@@ -270,7 +252,8 @@ static int look_at_oddities(const struct diagnosis_request *request, const struc
             oddities_add(&d->oddities, "%s", odd->texts[j]);
     }
     double inertia = d->model_given && !d->input_unit ? d->given.motor_inertia_kgm2 + d->given.load_inertia_kgm2 : 0.0;
-    return oddities_of_inertia(&request->fit[0], &w->recordings[0], inertia, &d->oddities, out_error);
+    return oddities_of_inertia(&request->fit[0], &w->recordings[0], inertia, d->given.structure == sim_structure_rigid,
+                               &d->oddities, out_error);
 }
 
 static int prepare_evidence(struct work *w, const struct diagnosis *d, struct error *out_error)
@@ -436,12 +419,15 @@ static bool names_new_mass(const struct hypothesis *before, const struct hypothe
     return false;
 }
 
-/// Drops a hidden mass without which the rest does as well, each with its own noise. Returns whether memory sufficed.
+/// Drops a hidden mass without which the rest does as well, each with its own noise; of several the one that is missed
+/// least. Returns whether memory sufficed.
 static bool drop_hidden_mass(struct work *w, struct hypothesis *h, struct sim_model *io_model)
 {
     if (!fit_hidden_mass(w, h, io_model))
         return false;
-    double cost = w->fit.cost;
+    double credible = hidden_mass_credible_cost(&w->fit_data, w->fit.cost), least = INFINITY;
+    struct hypothesis best = *h;
+    struct sim_model best_model = *io_model;
     for (int e = 0; sim_effects[e]; e++) {
         struct hypothesis without = *h;
         struct sim_model model;
@@ -451,13 +437,18 @@ static bool drop_hidden_mass(struct work *w, struct hypothesis *h, struct sim_mo
         hypothesis_model(&without, NULL, &model);
         if (!fit_anew(w, &without, &model) || !fit_anew(w, &without, &model))
             return false;
-        if (w->fit.cost < cost + 2.0 * search_threshold(&w->fit_data, e)) {
-            *h = without;
-            *io_model = model;
-            return true;
+        double missed = w->fit.cost - credible - 2.0 * search_threshold(&w->fit_data, e);
+        if (missed < fmin(least, 0.0)) {
+            least = missed;
+            best = without;
+            best_model = model;
         }
     }
-    return fit_hidden_mass(w, h, io_model);
+    if (same_names(&best, h))
+        return fit_hidden_mass(w, h, io_model);
+    *h = best;
+    *io_model = best_model;
+    return fit_anew(w, h, io_model);
 }
 
 /// One round of the search. The structure stays where it is meanwhile if the noise depends on it.
@@ -546,6 +537,8 @@ static void add_finding(const struct recording *r, struct diagnosis *d)
     memset(cause, 0, sizeof *cause);
     cause->effect = f->effect;
     cause->evidence = f->evidence;
+    cause->without = (struct diagnosis_figures){NAN, NAN, NAN};
+    cause->unseen_nats = NAN;
     memcpy(cause->values, f->values, sizeof cause->values);
     memcpy(cause->deviations, f->deviations, sizeof cause->deviations);
     struct sim_finding finding = {cause->values, cause->deviations, cause->nominal, d->linear};
@@ -683,6 +676,18 @@ static double ceiling_rms(const struct work *w, const struct sim_model *extended
     return rms;
 }
 
+/// What each name is worth on unseen data; what was found in the rows themselves is no part of the model's error.
+static bool measure_causes(const struct work *w, struct diagnosis *d, const struct hypothesis *h)
+{
+    bool good = true;
+    for (size_t i = 0; good && i < d->cause_count + d->candidate_count; i++) {
+        struct diagnosis_cause *cause = i < d->cause_count ? &d->causes[i] : &d->candidates[i - d->cause_count];
+        if (h->named[cause->effect])
+            good = cause_gain_measure(&w->fit_data, h, &w->validate_data, cause);
+    }
+    return good;
+}
+
 static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesis *h)
 {
     // The noise of the validation data under the extended model; one set of weights for all three models.
@@ -717,8 +722,13 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     list_causes(w, d, h, &judgement);
     list_untestable(w, d, h);
     list_deviations(w, d, h);
+    if (!misfit_find(&w->fit_data, &d->given, &d->extended_model, &d->fitted_misfit) ||
+        !misfit_find(&w->validate_data, &d->given, &d->extended_model, &d->misfit) || !measure_causes(w, d, h))
+        return false;
     if (judgement.unexplained) {
-        snprintf(d->where, sizeof d->where, "%s", judgement.where);
+        wording_rest(d, judgement.where, d->where);
+        d->rest_shape = judgement.shape;
+        d->rest_in_time = judgement.leftover_in_time > 0.0;
         d->unexplained_share = distant ? validate_share_left(d->nominal.validation_nrmse, d->extended.validation_nrmse,
                                                              d->noise_floor_nrmse)
                                        : validate_share_left(d->nominal.mean_rms, d->extended.mean_rms, 1.0);
@@ -751,7 +761,8 @@ int diagnosis_run(const struct diagnosis_request *request, struct diagnosis *out
     if (status == 0)
         status = prepare_evidence(&w, d, out_error);
     if (status == 0) {
-        wording_runs(request, d->runs);
+        wording_runs(request->fit, request->fit_count, d->runs);
+        wording_judged(request, w.parts.first_row, d->judged);
         snprintf(d->motion_from, sizeof d->motion_from, "%s", w.recordings[0].motion_from);
         tell(request, "refitting the given model");
         if (!find_causes(request, &w, d, &h) ||

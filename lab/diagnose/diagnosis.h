@@ -6,6 +6,7 @@
 #ifndef SERVOSCOPE_DIAGNOSE_DIAGNOSIS_H
 #define SERVOSCOPE_DIAGNOSE_DIAGNOSIS_H
 
+#include "lab/diagnose/misfit.h"
 #include "lab/diagnose/oddities.h"
 #include "lab/record/error.h"
 #include "lab/record/model_file.h"
@@ -19,6 +20,13 @@ enum diagnosis_verdict { diagnosis_explained, diagnosis_unexplained, diagnosis_n
 
 enum { diagnosis_causes_max = 8, diagnosis_ties_max = 8, diagnosis_gain = -1 };
 
+/// How well one model does on the validation data.
+struct diagnosis_figures {
+    double validation_nrmse; ///< torque that the model lacks or misplaces, over the measured torque's RMS; validate.h
+    double whitened_rms;     ///< one-step prediction errors over their expected standard deviation, all periods
+    double mean_rms;         ///< the same of the mean of the periods, where noise hides less of what is wrong
+};
+
 /// An effect found, with estimates.
 struct diagnosis_cause {
     int effect;      ///< index in sim_effects
@@ -26,6 +34,8 @@ struct diagnosis_cause {
     double values[sim_effect_parameters_max];
     double deviations[sim_effect_parameters_max];
     double nominal[sim_effect_parameters_max]; ///< of the given model, 0 where it has none
+    struct diagnosis_figures without;          ///< of the extended model without it, the rest refitted; NaN: not known
+    double unseen_nats; ///< what it earns on data the fit has not seen, everything else kept; NaN: not known
     char says[400];
 };
 
@@ -37,13 +47,6 @@ struct diagnosis_tie {
 struct diagnosis_untestable {
     int effect;
     char why[200];
-};
-
-/// How well one model does on the validation data.
-struct diagnosis_figures {
-    double validation_nrmse; ///< torque that the model lacks or misplaces, over the measured torque's RMS; validate.h
-    double whitened_rms;     ///< one-step prediction errors over their expected standard deviation, all periods
-    double mean_rms;         ///< the same of the mean of the periods, where noise hides less of what is wrong
 };
 
 /// Curves for the report, from the validation data. All arrays are owned and have the stated number of values.
@@ -66,7 +69,8 @@ struct diagnosis {
     enum diagnosis_verdict verdict;
     bool inertia_seen;                   ///< without a model: the recordings say what the inertia is
     bool linear, model_given, held_back; ///< held_back: validated on the last part of the only run
-    char runs[512], motion_from[280];    ///< what was fitted; one sentence on the filtering
+    char runs[512], judged[512];         ///< what was fitted, what was judged on
+    char motion_from[280];               ///< one sentence on the filtering
     const char *input_unit;              ///< "A", "V", or NULL: a torque or a force
     double input_gain;                   ///< torque or force per unit of the input
     double input_gain_deviation;         ///< its standard deviation, 0 where it was not estimated
@@ -83,8 +87,11 @@ struct diagnosis {
                             ///< that is not below extended.mean_rms, no function of speed and position is left to find
     double mean_rms_chance; ///< what the noise lets a perfect model's mean_rms exceed once in twenty
     double fit_misfit;      ///< mean squared whitened residual of the extended model on the fit runs, 1 is perfect
-    char where[300];        ///< unexplained: in words, empty otherwise
-    double unexplained_share; ///< of the nominal model's misfit, 0..1
+    struct misfit misfit, fitted_misfit; ///< where the models are wrong: on unseen data, on the fitted runs
+    char where[640];                     ///< unexplained: in words, empty otherwise
+    int rest_shape;                      ///< unexplained: enum blackbox_group of what would explain it; -1: not known
+    bool rest_in_time;                   ///< unexplained: it differs between the periods, or creeps
+    double unexplained_share;            ///< of the nominal model's misfit, 0..1
     struct diagnosis_curves curves;
 };
 

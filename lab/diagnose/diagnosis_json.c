@@ -51,8 +51,11 @@ static bool add_causes(cJSON *root, const char *name, const struct diagnosis_cau
     for (size_t i = 0; ok && i < count; i++) {
         cJSON *object = append_object(array);
         ok = object && add_text(object, "id", sim_effects[causes[i].effect]->id) &&
-             add_number(object, "evidence", causes[i].evidence) && add_parameters(object, &causes[i], self) &&
-             add_text(object, "says", causes[i].says);
+             add_number(object, "evidence", causes[i].evidence) &&
+             add_number(object, "validation_nrmse_without", causes[i].without.validation_nrmse) &&
+             add_number(object, "whitened_rms_without", causes[i].without.whitened_rms) &&
+             add_number(object, "validation_evidence", causes[i].unseen_nats) &&
+             add_parameters(object, &causes[i], self) && add_text(object, "says", causes[i].says);
     }
     return ok;
 }
@@ -101,6 +104,66 @@ static bool add_unexplained(cJSON *root, const struct diagnosis *self)
     return object && add_text(object, "where", self->where) && add_number(object, "share", self->unexplained_share);
 }
 
+/// Numbers of one axis' parts as an array.
+static bool add_row(cJSON *object, const char *name, size_t count, const double *values)
+{
+    cJSON *array = cJSON_AddArrayToObject(object, name);
+    bool ok = array != NULL;
+    for (size_t i = 0; ok && i < count; i++) {
+        cJSON *number = isfinite(values[i]) ? cJSON_CreateNumber(values[i]) : cJSON_CreateNull();
+        ok = number && cJSON_AddItemToArray(array, number);
+    }
+    return ok;
+}
+
+/// What of a model's misfit lies in each part, and the range where it sits, if there is one.
+static bool add_left(cJSON *root, const char *name, const struct misfit_axis *axis, enum misfit_model model)
+{
+    double rms[misfit_parts_max], share[misfit_parts_max], excess = 0.0;
+    const struct misfit_range *range = &axis->range[model];
+    cJSON *object = cJSON_AddObjectToObject(root, name);
+    for (size_t i = 0; i < axis->parts; i++)
+        excess += axis->part[i].squares[model] - axis->part[i].values;
+    for (size_t i = 0; i < axis->parts; i++) {
+        rms[i] = misfit_rms(&axis->part[i], model);
+        share[i] = excess > 0.0 ? (axis->part[i].squares[model] - axis->part[i].values) / excess : NAN;
+    }
+    if (!object || !add_row(object, "rms", axis->parts, rms) || !add_row(object, "share", axis->parts, share))
+        return false;
+    if (!range->found)
+        return true;
+    cJSON *most = cJSON_AddObjectToObject(object, "most");
+    return most && add_number(most, "from", range->low) && add_number(most, "to", range->high) &&
+           add_number(most, "share", range->share) && add_number(most, "of_values", range->values);
+}
+
+static bool add_axis(cJSON *root, const struct misfit_axis *axis, enum misfit_axis_kind kind, bool linear)
+{
+    double from[misfit_parts_max], to[misfit_parts_max];
+    cJSON *object = cJSON_AddObjectToObject(root, misfit_axis_name(kind, linear));
+    for (size_t i = 0; i < axis->parts; i++) {
+        from[i] = axis->part[i].low;
+        to[i] = axis->part[i].high;
+    }
+    return object && add_row(object, "from", axis->parts, from) && add_row(object, "to", axis->parts, to) &&
+           add_left(object, "nominal", axis, misfit_given) && add_left(object, "extended", axis, misfit_extended);
+}
+
+static bool add_misfit(cJSON *root, const struct diagnosis *self)
+{
+    const struct misfit *m = &self->misfit;
+    char given[wording_size], left[wording_size];
+    cJSON *object = cJSON_AddObjectToObject(root, "misfit");
+    wording_where(self, m, misfit_given, given);
+    wording_where(self, m, misfit_extended, left);
+    bool ok = object && add_text(object, "nominal_where", given) && add_text(object, "extended_where", left) &&
+              add_number(object, "nominal_noise_share", misfit_noise_share(m, misfit_given)) &&
+              add_number(object, "extended_noise_share", misfit_noise_share(m, misfit_extended));
+    for (int a = 0; ok && a < misfit_axes; a++)
+        ok = add_axis(object, &m->axes[a], (enum misfit_axis_kind)a, self->linear);
+    return ok;
+}
+
 static bool add_notes(cJSON *root, const struct diagnosis *self)
 {
     cJSON *array = cJSON_AddArrayToObject(root, "notes");
@@ -144,8 +207,8 @@ static bool add_context(cJSON *root, const struct diagnosis *self)
     wording_headline(self, headline);
     wording_gain(self, gain);
     return add_text(root, "headline", headline) && add_text(root, "gain", gain) && add_text(root, "runs", self->runs) &&
-           add_text(root, "motion_from", self->motion_from) && add_notes(root, self) && add_next(root, self) &&
-           cJSON_AddBoolToObject(root, "linear", self->linear) &&
+           add_text(root, "judged_on", self->judged) && add_text(root, "motion_from", self->motion_from) &&
+           add_notes(root, self) && add_next(root, self) && cJSON_AddBoolToObject(root, "linear", self->linear) &&
            cJSON_AddBoolToObject(root, "model_given", self->model_given) &&
            cJSON_AddBoolToObject(root, "held_back", self->held_back) &&
            add_number(root, "fit_misfit", self->fit_misfit) && add_gain(root, self);
@@ -162,7 +225,7 @@ cJSON *diagnosis_json(const struct diagnosis *self)
               add_number(root, "noise_floor_nrmse", self->noise_floor_nrmse) &&
               add_number(root, "mean_rms_chance", self->mean_rms_chance) &&
               add_number(root, "black_box_rms", self->black_box_rms) && add_unexplained(root, self) &&
-              add_context(root, self);
+              add_misfit(root, self) && add_context(root, self);
     if (!ok) {
         cJSON_Delete(root);
         return NULL;

@@ -34,6 +34,13 @@ bool hidden_mass_fit(struct fit_data *data, struct evidence *evidence, struct fi
     return good;
 }
 
+double hidden_mass_credible_cost(const struct fit_data *data, double cost)
+{
+    const double twentieth = 1.645;
+    double values = (double)data->values;
+    return fmax(cost, values - twentieth * sqrt(2.0 * values));
+}
+
 /// What the noise depends on: the numbers of the structure, and the inertias between which it divides.
 static bool is_of_structure(const struct coordinate *c)
 {

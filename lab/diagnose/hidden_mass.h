@@ -22,6 +22,11 @@ bool hidden_mass_concerns(const struct fit_data *data, const struct hypothesis *
 bool hidden_mass_fit(struct fit_data *data, struct evidence *evidence, struct fit *fit,
                      struct hypothesis *io_hypothesis);
 
+/// A cost that is to be believed. The noise that follows the parameters is a mean over neighbouring bins: a resonance
+/// sharper than that gathers it where the residual happens to be small, and leaves less than noise can. What is below
+/// the lowest twentieth of chance is no evidence.
+double hidden_mass_credible_cost(const struct fit_data *data, double cost);
+
 /// Keeps the coordinates of a structure where they are, for a search in which the noise stays; out_free: the boxes that
 /// hidden_mass_release() gives back to those that are still there.
 void hidden_mass_hold(struct hypothesis *io_hypothesis, struct hypothesis *out_free);

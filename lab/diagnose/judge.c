@@ -119,36 +119,21 @@ static double evidence_outside(const struct fit_data *data, const struct hypothe
     return gain;
 }
 
-/// Says where the residual is: the band of frequencies that holds most of it, and what kind of term would explain it.
+/// Says what kind of term would explain what is left, and how much of it. Where it lies, misfit.h says.
 static void describe_rest(const struct blackbox *box, const struct fit_data *data, const struct hypothesis *h,
-                          const struct fit *fit, char *out_text, size_t size)
+                          const struct fit *fit, struct judgement *io_judgement)
 {
-    enum { bands = 8 };
-    const struct evidence *e = &data->evidence[0];
-    double sums[bands] = {0}, total = 0.0;
-    for (size_t i = 0; i < e->values; i++) {
-        size_t channel, bin = evidence_bin(e, i, &channel);
-        double excess = fit->residual[i] * fit->residual[i] - 1.0;
-        sums[bin * bands / (e->recording->band + 1)] += excess;
-        total += excess;
-    }
-    size_t worst = 0;
-    for (size_t b = 1; b < bands; b++)
-        if (sums[b] > sums[worst])
-            worst = b;
-    double width_hz =
-        (double)(e->recording->band + 1) / bands * e->recording->rate_hz / (double)e->recording->block.samples;
-    double gains[blackbox_groups];
+    double excess = fmax(fit->cost - (double)data->values, 1e-9), gains[blackbox_groups];
     int best = 0;
     for (int g = 0; g < blackbox_groups; g++) {
         gains[g] = blackbox_gain(box, data, h, fit, 1u << g, NULL, NULL);
         if (gains[g] > gains[best])
             best = g;
     }
-    snprintf(out_text, size, "%.3g..%.3g Hz holds %.0f %% of it; %s would explain %.0f %% of it",
-             (double)worst * width_hz, (double)(worst + 1) * width_hz,
-             100.0 * fmin(fmax(sums[worst] / fmax(total, 1e-9), 0.0), 1.0),
-             blackbox_group_name((enum blackbox_group)best), 100.0 * fmin(2.0 * gains[best] / fmax(total, 1e-9), 1.0));
+    io_judgement->shape = best;
+    snprintf(io_judgement->where, sizeof io_judgement->where,
+             "no known cause has its shape, but %s would fit %.0f %% of it",
+             blackbox_group_name((enum blackbox_group)best), 100.0 * fmin(2.0 * gains[best] / excess, 1.0));
 }
 
 /// Structure over time in what the hypothesis leaves of the contrasts (`fit` NULL: in what is there of them without
@@ -321,7 +306,7 @@ static void judge_mean(const struct bench *b, double validation_rms, bool worse,
                      b->fit->cost / values > too_much * too_much || !(validation_rms < too_much);
     j->of_mean = j->unexplained;
     if (j->unexplained) {
-        describe_rest(b->box, b->data, b->hypothesis, b->fit, j->where, sizeof j->where);
+        describe_rest(b->box, b->data, b->hypothesis, b->fit, j);
         return;
     }
     enum blackbox_group gap =
@@ -329,6 +314,7 @@ static void judge_mean(const struct bench *b, double validation_rms, bool worse,
     if (gap == blackbox_groups)
         return;
     j->unexplained = j->of_mean = true;
+    j->shape = (int)gap;
     j->leftover = b->fit->cost;
     snprintf(j->where, sizeof j->where, "several names were needed for one gap, which %s alone would close",
              blackbox_group_name(gap));
@@ -351,6 +337,7 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
     struct blackbox box;
     struct structure over_time;
     memset(out_judgement, 0, sizeof *out_judgement);
+    out_judgement->shape = -1;
     double *rest = malloc(data->values * sizeof *rest);
     if (!rest || !blackbox_init(&box, data)) {
         free(rest);

@@ -14,6 +14,7 @@ struct judgement {
     double leftover_in_time;   ///< nats of structure over time that stays; 0: none
     size_t count;              ///< of named effects that stand
     bool stands[sim_effects_max];
+    int shape;       ///< enum blackbox_group of what would explain the rest, or alone the whole; -1: not known
     char where[300]; ///< what is left, in words
 };
 

@@ -56,6 +56,14 @@ static double taper(const struct recording *r, size_t i)
     return 0.5 - 0.5 * cos(pi * ((double)from_end + 0.5) / (double)edge);
 }
 
+double evidence_weight(const struct evidence *self, size_t i)
+{
+    const struct recording *r = self->recording;
+    double n = (double)r->block.samples, edges = r->periodic ? 0.0 : 2.0 * floor(n / 20.0);
+    double square = taper(r, i) * taper(r, i);
+    return square / (1.0 - 0.625 * edges / n); // the mean square of half a cosine's rise is 3/8
+}
+
 void evidence_transform(const struct evidence *self, const double *signal, double *out_spectrum)
 {
     const struct recording *r = self->recording;

@@ -76,6 +76,10 @@ void evidence_whiten(const struct evidence *self, const double *mechanics, const
 /// out: 2 (band + 1) values.
 void evidence_transform(const struct evidence *self, const double *signal, double *out_spectrum);
 
+/// Expected square of sample i of the block's noise over the mean of all: the ends of a run without periods are
+/// tapered.
+double evidence_weight(const struct evidence *self, size_t i);
+
 /// Bin that value number i of a whitened residual belongs to, and its channel: 0 mechanics, 1 actuator, 2 kinematics.
 size_t evidence_bin(const struct evidence *self, size_t i, size_t *out_channel);
 

@@ -410,10 +410,11 @@ static int refuse_inertia(const struct run *run, double inertia, double measured
 }
 
 /// Both positive: nothing to say of what a model may be off by, a sentence of more, an error of what none is off by.
-static int compare_inertia(const struct run *run, double inertia, double measured, struct oddities *io,
+static int compare_inertia(const struct run *run, double inertia, double measured, bool rigid, struct oddities *io,
                            struct error *out_error)
 {
-    const double far = 3.0, absurd = 100.0;
+    // Beside a resonance torque and acceleration say little of the whole inertia.
+    const double far = rigid ? 3.0 : 10.0, absurd = 100.0;
     double off = fmax(inertia / measured, measured / inertia);
     const char *unit = run->linear ? "kg" : "kgm2";
     if (off > absurd)
@@ -426,7 +427,7 @@ static int compare_inertia(const struct run *run, double inertia, double measure
     return 0;
 }
 
-int oddities_of_inertia(const struct run *run, const struct recording *recording, double inertia,
+int oddities_of_inertia(const struct run *run, const struct recording *recording, double inertia, bool rigid,
                         struct oddities *io_oddities, struct error *out_error)
 {
     double measured = measured_inertia(recording), scale;
@@ -450,5 +451,5 @@ int oddities_of_inertia(const struct run *run, const struct recording *recording
             "%s: positive torque makes the motion accelerate backward: the sign of the torque or of the motion "
             "is wrong (--map %s=COLUMN*-1)",
             path_of(run), linear ? "force_N" : "torque_Nm");
-    return compare_inertia(run, inertia, measured, io_oddities, out_error);
+    return compare_inertia(run, inertia, measured, rigid, io_oddities, out_error);
 }

@@ -39,8 +39,8 @@ const char *oddities_unit(double factor, bool linear, bool motion, double *out_s
 
 /// Whether motion and torque go together as a model's inertia says: least squares of torque on acceleration.
 /// Errors: error_refused if the factor between the two is that of a unit, or above 100; a sentence if it is
-/// merely large
-int oddities_of_inertia(const struct run *run, const struct recording *recording, double inertia,
+/// merely large; how large may be more for a model that is not rigid
+int oddities_of_inertia(const struct run *run, const struct recording *recording, double inertia, bool rigid,
                         struct oddities *io_oddities, struct error *out_error);
 
 #endif

@@ -23,16 +23,16 @@ static bool is_lost(const struct stretch *s, size_t n)
     return s->lost && s->lost[n];
 }
 
-/// Torque over substep i when only the measured torque is known: straight between its samples unless they are held.
-static double measured_torque(const struct predictor *p, size_t n, size_t i)
+/// Moves over substep i when only the measured torque is known: straight between its samples unless they are held.
+static void move_measured(struct predictor *p, size_t n, size_t i)
 {
     const double *torque = p->stretch->torque;
-    if (p->stretch->held)
-        return torque[n];
     size_t last = p->stretch->samples - 1;
-    size_t next = n < last ? n + 1 : p->cyclic ? 0 : last;
-    double part = ((double)i + 0.5) / (double)p->stretch->substeps;
-    return torque[n] + part * (torque[next] - torque[n]);
+    size_t next = p->stretch->held ? n : n < last ? n + 1 : p->cyclic ? 0 : last;
+    double share = 1.0 / (double)p->stretch->substeps, rise = torque[next] - torque[n];
+    // A line that rises by r over the step: I1 = -r / 12, I2 = -r / 24.
+    struct sim_torque line = {torque[n] + ((double)i + 0.5) * share * rise, -rise * share / 24.0, -rise * share / 24.0};
+    sim_plant_move_under(&p->plant, &p->stepper, &line);
 }
 
 /// Sets the motor to where the sensors saw it, unless they saw nothing.
@@ -74,8 +74,10 @@ static double predict_sample(struct predictor *p, size_t n)
     }
     place_motor(p, n);
     for (size_t i = 0; i < s->substeps; i++) {
-        double torque = s->torque_ref ? sim_actuator_substep(&p->actuator, &p->stepper, i) : measured_torque(p, n, i);
-        sim_plant_move(&p->plant, &p->stepper, torque);
+        if (s->torque_ref)
+            sim_plant_drive(&p->plant, &p->stepper, &p->actuator, i, 0.0);
+        else
+            move_measured(p, n, i);
     }
     return now;
 }

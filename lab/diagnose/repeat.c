@@ -47,6 +47,17 @@ static void compare_effect(const struct hypothesis *h, const struct fit *fit, do
     }
 }
 
+/// What is at a wall of its box has no say in what the others come to; elsewhere it would move them along with it. So
+/// like is compared with like: it stays there.
+static void hold_walls(struct hypothesis *io)
+{
+    for (size_t i = 0; i < io->count; i++) {
+        struct coordinate *c = &io->coordinates[i];
+        if (!(io->x[i] > c->lower && io->x[i] < c->upper))
+            c->lower = c->upper = io->x[i];
+    }
+}
+
 bool repeat_compare(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit,
                     struct fit_data *other, struct evidence *other_evidence, struct repeat *out_repeat)
 {
@@ -60,6 +71,7 @@ bool repeat_compare(const struct fit_data *data, const struct hypothesis *hypoth
         return true;
     if (!fit_init(&again, other))
         return false;
+    hold_walls(&moved);
     bool good = hidden_mass_concerns(other, &moved) ? hidden_mass_fit(other, other_evidence, &again, &moved)
                                                     : fit_run(&again, other, &moved, repeat_iterations);
     if (good)

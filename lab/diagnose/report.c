@@ -2,7 +2,7 @@
 #include "lab/diagnose/report.h"
 
 #include "lab/diagnose/report_curves.h"
-#include "lab/diagnose/report_where.h"
+#include "lab/diagnose/report_misfit.h"
 #include "lab/diagnose/wording.h"
 #include "lab/record/atomic_file.h"
 
@@ -46,8 +46,13 @@ static void add_verdict(struct page *page, const struct diagnosis *self)
         snprintf(sentence, sizeof sentence, " The extended model takes away %s of the squared error that is not noise.",
                  removed_text);
     }
+    char left[wording_size] = "";
+    if (self->verdict == diagnosis_unexplained) {
+        wording_left(self, left);
+        strcat(left, ".");
+    }
     enum page_mood mood = self->verdict == diagnosis_unexplained ? page_warning : page_good;
-    page_add_note(page, mood, headline, "%s%s", gain, sentence);
+    page_add_note(page, mood, headline, "%s%s%s%s", gain, sentence, left[0] ? " " : "", left);
 }
 
 /// The given model in one line: what it has, in its own numbers.
@@ -86,9 +91,7 @@ static void add_given(struct page *page, const struct diagnosis *self)
     page_add_section(page, "What was given");
     page_start_pairs(page);
     page_add_pair(page, "Fitted on", "%s", self->runs);
-    page_add_pair(page, "Judged on", "%s",
-                  self->held_back ? "the last third of the only run, which the fit has not seen"
-                                  : "the validation runs, which the fit has not seen");
+    page_add_pair(page, "Judged on", "%s, which the fit has not seen", self->judged);
     page_add_pair(page, "Model", "%s",
                   self->model_given ? model : "none: a rigid body without friction, its inertia free");
     if (self->motion_from[0] != '\0') {
@@ -119,6 +122,14 @@ static void add_excess(struct page *page, const struct diagnosis *self)
         exp(-4.0) * (double)after.bins); // |z|^2 of a circular complex Gaussian is exponential: P(|z| > 2 sigma) = e^-4
 }
 
+static void add_bands(struct figure_panel *panel, const char *name, const struct report_bands *bands,
+                      const double *values, enum figure_colour colour, enum figure_marker marker)
+{
+    struct figure_series *points = figure_add_points(panel, name, bands->count, bands->frequency_hz, values);
+    points->colour = colour;
+    points->marker = marker;
+}
+
 static void add_spectrum(struct page *page, const struct diagnosis *self)
 {
     struct wording_units units = wording_units(self);
@@ -136,12 +147,11 @@ static void add_spectrum(struct page *page, const struct diagnosis *self)
     figure.legend = figure_legend_below;
     struct figure_panel *panel = figure_add_panel(&figure, label, axis_log);
     panel->height = 230;
-    figure_add_points(panel, "model as given", bands.count, bands.frequency_hz, bands.nominal)->colour =
-        figure_vermilion;
+    add_bands(panel, "model as given", &bands, bands.nominal, figure_vermilion, figure_triangle);
     if (wording_is_extended(self)) {
-        figure_add_points(panel, "refitted", bands.count, bands.frequency_hz, bands.refitted)->colour = figure_orange;
+        add_bands(panel, "refitted", &bands, bands.refitted, figure_orange, figure_diamond);
     }
-    figure_add_points(panel, best_model(self), bands.count, bands.frequency_hz, bands.extended)->colour = figure_green;
+    add_bands(panel, best_model(self), &bands, bands.extended, figure_green, figure_circle);
     figure_add_limit(panel, "what noise explains", 1.0);
     char grouping[80] = "one point per line";
     if (bands.widest > 1) {
@@ -152,21 +162,30 @@ static void add_spectrum(struct page *page, const struct diagnosis *self)
                     units.torque, grouping);
 }
 
-static void add_error_panel(struct figure *figure, const struct diagnosis *self, size_t from, size_t count)
+/// The error of both models in panels of one scale.
+static void add_error_panels(struct figure *figure, const struct diagnosis *self, size_t from, size_t count)
 {
     const struct diagnosis_curves *c = &self->curves;
     struct wording_units units = wording_units(self);
-    char label[figure_text_max];
-    snprintf(label, sizeof label, "%s error in %s", units.torque, units.torque_unit);
-    struct figure_panel *panel = figure_add_panel(figure, label, axis_linear);
-    struct figure_series *before =
-        figure_add_line(panel, "model as given", count, c->time_s + from, c->residual_nominal + from);
-    before->colour = figure_vermilion;
-    before->dash = figure_solid;
-    struct figure_series *after =
-        figure_add_line(panel, best_model(self), count, c->time_s + from, c->residual_extended + from);
-    after->colour = figure_green;
-    after->dash = figure_solid;
+    const char *const names[] = {"model as given", best_model(self)};
+    const double *const errors[] = {c->residual_nominal + from, c->residual_extended + from};
+    const enum figure_colour colours[] = {figure_vermilion, figure_green};
+    double largest = 0.0;
+    for (size_t i = 0; i < count; i++)
+        largest = fmax(largest, fmax(fabs(errors[0][i]), fabs(errors[1][i]))); // fmax leaves out what is no number
+    for (size_t m = 0; m < 2; m++) {
+        char label[figure_text_max];
+        snprintf(label, sizeof label, "%s error in %s, %s", units.torque, units.torque_unit, names[m]);
+        struct figure_panel *panel = figure_add_panel(figure, label, axis_linear);
+        panel->height = 110;
+        if (largest > 0.0) {
+            panel->low = -largest;
+            panel->high = largest;
+        }
+        struct figure_series *line = figure_add_line(panel, "", count, c->time_s + from, errors[m]);
+        line->colour = colours[m];
+        line->dash = figure_solid;
+    }
 }
 
 /// A twentieth of the block around the worst place, but enough samples to see the shape of an event.
@@ -188,7 +207,7 @@ static void add_time(struct page *page, const struct diagnosis *self)
     struct figure figure;
     figure_start(&figure, "time in s", axis_linear);
     figure.legend = figure_legend_below;
-    add_error_panel(&figure, self, 0, c->samples);
+    add_error_panels(&figure, self, 0, c->samples);
     page_add_figure(page, &figure,
                     "The %s that each model lacks over time, in the band looked at: %.3g %s RMS as given, %.3g %s "
                     "%s.",
@@ -200,57 +219,13 @@ static void add_time(struct page *page, const struct diagnosis *self)
     snprintf(label, sizeof label, "speed in %s", units.speed_unit);
     figure_start(&figure, "time in s", axis_linear);
     figure.legend = figure_legend_below;
-    add_error_panel(&figure, self, from, width);
+    add_error_panels(&figure, self, from, width);
     struct figure_panel *panel = figure_add_panel(&figure, label, axis_linear);
     panel->height = 110;
     figure_add_line(panel, "measured speed", width, c->time_s + from, c->velocity + from)->colour = figure_blue;
     page_add_figure(page, &figure,
                     "The same around the worst %.3g s of the given model, from %.4g s on, with the speed.",
                     (double)width / c->rate_hz, c->time_s[from]);
-}
-
-static void add_places(struct page *page, const struct diagnosis *self)
-{
-    struct wording_units units = wording_units(self);
-    struct report_places places;
-    if (!report_places_find(&self->curves, &places))
-        return;
-    struct figure figure;
-    char label[figure_text_max];
-    snprintf(label, sizeof label, "%s error in %s, RMS", units.torque, units.torque_unit);
-    figure_start(&figure, self->linear ? "position in m" : "position in rad", axis_linear);
-    figure.legend = figure_legend_below;
-    struct figure_panel *panel = figure_add_panel(&figure, label, axis_linear);
-    panel->height = 130;
-    panel->from_zero = true;
-    figure_add_points(panel, "model as given", report_places, places.position, places.nominal)->colour =
-        figure_vermilion;
-    figure_add_points(panel, best_model(self), report_places, places.position, places.extended)->colour = figure_green;
-    page_add_figure(page, &figure, "The errors by place, over %d equal parts of the travel.", report_places);
-}
-
-/// Where the errors lie, beside how much of the recording that is.
-static void add_shares(struct page *page, const struct diagnosis *self)
-{
-    static const char *const heads[] = {"where", "share of the samples", "of the given model's error", "of what stays"};
-    struct report_share shares[report_shares_max];
-    size_t count = report_shares_find(&self->curves, self->linear, shares);
-    if (count == 0)
-        return;
-    page_start_table(
-        page,
-        "Where the squared errors lie. Where a share is no larger than that of the samples, the place is no "
-        "hint at the cause.",
-        "lrrr", heads);
-    for (size_t i = 0; i < count; i++) {
-        char samples[wording_short], nominal[wording_short], extended[wording_short];
-        wording_percent(shares[i].samples, samples);
-        wording_percent(shares[i].nominal, nominal);
-        wording_percent(shares[i].extended, extended);
-        const char *cells[] = {shares[i].what, samples, nominal, extended};
-        page_add_row(page, cells);
-    }
-    page_end_table(page);
 }
 
 static void add_parameter_rows(struct page *page, const struct diagnosis_cause *cause, bool linear)
@@ -276,10 +251,11 @@ static void add_cause_list(struct page *page, const struct diagnosis *self, cons
     static const char *const heads[] = {"cause", "parameter", "given", "estimate ± std", "evidence in nats"};
     page_start_list(page);
     for (size_t i = 0; i < count; i++) {
-        char name[wording_short], says[wording_size];
+        char name[wording_short], says[wording_size], unseen[wording_size];
         wording_effect(causes[i].effect, name);
         with_signs(causes[i].says, says);
-        page_add_item(page, name, "%s", says);
+        wording_unseen(self, &causes[i], unseen);
+        page_add_item(page, name, "%s%s%s", says, unseen[0] ? " " : "", unseen);
     }
     page_end_list(page);
     page_start_table(page, caption, "llrrr", heads);
@@ -453,10 +429,9 @@ static void add_rest(struct page *page, const struct diagnosis *self)
 {
     page_add_section(page, "What stays unexplained");
     if (self->verdict == diagnosis_unexplained) {
-        char share[wording_short];
-        wording_percent(self->unexplained_share, share);
-        page_add_note(page, page_warning, "Something is left that has no name",
-                      "%s of the given model's misfit stays%s%s.", share, self->where[0] ? ": " : "", self->where);
+        char left[wording_size];
+        wording_left(self, left);
+        page_add_note(page, page_warning, "Something is left that has no name", "%s.", left);
     } else {
         page_add_paragraph(page, "Nothing that stands out of the noise.");
     }
@@ -475,8 +450,7 @@ void diagnosis_report_sections(struct page *page, const struct diagnosis *self)
     page_add_section(page, self->verdict == diagnosis_no_discrepancy ? "How well the model fits" : "What is wrong");
     add_spectrum(page, self);
     add_time(page, self);
-    add_places(page, self);
-    add_shares(page, self);
+    report_misfit_add(page, self, best_model(self));
     add_causes(page, self);
     add_friction(page, self);
     add_gain(page, self);

@@ -37,6 +37,11 @@ void scan_free(struct scan *self)
 
 // ---- Long scans
 
+static bool has_phase(const struct sim_effect *e)
+{
+    return e->parameter_count > 1 && e->parameters[1].kind == sim_parameter_phase;
+}
+
 /// The torque that an effect at `values` would have added over the recorded motion, whitened: what the residual would
 /// look like, to first order, without running the simulation. `columns` of them: sine and cosine of an effect with a
 /// phase.
@@ -46,7 +51,7 @@ static size_t quick_columns(const struct scan *self, int effect, const double *v
     const struct sim_effect *e = sim_effects[effect];
     double p[sim_effect_parameters_max], *signal = self->columns + 2 * data->values;
     memcpy(p, values, sizeof p);
-    size_t columns = e->parameter_count > 1 && e->parameters[1].kind == sim_parameter_phase ? 2 : 1;
+    size_t columns = has_phase(e) ? 2 : 1;
     for (size_t column = 0; column < columns; column++) {
         double *whitened = self->columns + column * data->values;
         p[1] = columns == 2 ? 1.5707963267948966 * (double)column : values[1];
@@ -187,6 +192,45 @@ static bool restructures(const struct scan *self, int effect, const struct hypot
     return trial->engaged.structure != self->from->engaged.structure || e->attach || e->bend || e->build_up;
 }
 
+/// What an effect at a hypothesis' values changes of the residual, of which its square is returned; infinite where it
+/// leads nowhere.
+static double change_at(struct scan *self, const struct hypothesis *hypothesis, double *out_cost, double *out_column)
+{
+    struct fit *scratch = &self->scratch;
+    double change = 0.0;
+    *out_cost = fit_cost(scratch, self->data, hypothesis, hypothesis->x);
+    if (!isfinite(*out_cost))
+        return INFINITY;
+    for (size_t i = 0; i < self->data->values; i++) {
+        out_column[i] = scratch->residual[i] - self->fit->residual[i];
+        change += out_column[i] * out_column[i];
+    }
+    return change;
+}
+
+/// The same place a quarter of a turn on: half of what an effect with a phase may do has no part in what it does at one
+/// phase. The place is moved to the best size and phase of the two together, and `promise` said for them.
+static void look_across(struct scan *self, int effect, struct place *io_place)
+{
+    const double quarter = 1.5707963267948966, farthest = 30.0;
+    struct hypothesis across = *self->from;
+    double values[sim_effect_parameters_max], sizes[2], cost;
+    memcpy(values, io_place->values, sizeof values);
+    values[1] += quarter;
+    hypothesis_name(&across, effect, values);
+    if (!isfinite(change_at(self, &across, &cost, self->columns + self->data->values)))
+        return;
+    double left = self->fit->cost + beside_cost(&self->beside, self->columns, 2, sizes) - self->beside.cost;
+    double size = hypot(sizes[0], sizes[1]);
+    if (!(size > 0.0))
+        return;
+    values[0] *= fmin(fmax(size, 1.0 / farthest), farthest);
+    values[1] = io_place->values[1] + atan2(sizes[1], sizes[0]);
+    io_place->hypothesis = *self->from;
+    hypothesis_name(&io_place->hypothesis, effect, values);
+    io_place->promise = left;
+}
+
 /// Looks at one place: the change of the residual there is a direction, and how far along it is best costs nothing to
 /// say. A place that changes next to nothing, such as a number of the model that only leaves its box, says nothing of
 /// what it is worth.
@@ -194,17 +238,11 @@ static void look(struct scan *self, int effect, struct place *io_place)
 {
     const double nothing = 1e-6; // of the cost
     const struct sim_effect *e = sim_effects[effect];
-    struct fit *scratch = &self->scratch;
-    io_place->cost = fit_cost(scratch, self->data, &io_place->hypothesis, io_place->hypothesis.x);
-    io_place->promise = io_place->cost;
     io_place->size = 1.0;
-    if (!isfinite(io_place->cost))
+    double change = change_at(self, &io_place->hypothesis, &io_place->cost, self->columns);
+    io_place->promise = io_place->cost;
+    if (!isfinite(change))
         return;
-    double change = 0.0;
-    for (size_t i = 0; i < self->data->values; i++) {
-        self->columns[i] = scratch->residual[i] - self->fit->residual[i];
-        change += self->columns[i] * self->columns[i];
-    }
     if (e->in_time || change < nothing * self->fit->cost) {
         io_place->promise = -INFINITY;
         return;
@@ -212,6 +250,8 @@ static void look(struct scan *self, int effect, struct place *io_place)
     double left = self->fit->cost + beside_cost(&self->beside, self->columns, 1, &io_place->size) - self->beside.cost;
     bool backward = io_place->size < 0.0 && e->parameters[0].kind == sim_parameter_positive;
     io_place->promise = fmin(io_place->cost, backward ? self->fit->cost : left);
+    if (e->sense && has_phase(e))
+        look_across(self, effect, io_place);
 }
 
 /// What is better already before what may become so; then valleys, of two alike the one that promises more.

@@ -81,7 +81,8 @@ void wording_effect(int effect, char out_text[wording_short])
     }
 }
 
-void wording_list(const struct diagnosis_cause *causes, size_t count, size_t size, char *out_text)
+/// The causes' names in one row: "cogging, load bias and inertia"; "" for none.
+static void list_names(const struct diagnosis_cause *causes, size_t count, size_t size, char *out_text)
 {
     size_t used = 0;
     out_text[0] = '\0';
@@ -136,7 +137,7 @@ static bool refit_matters(const struct diagnosis *self)
 void wording_headline(const struct diagnosis *self, char out_text[wording_size])
 {
     char list[wording_size / 2];
-    wording_list(self->causes, self->cause_count, sizeof list, list);
+    list_names(self->causes, self->cause_count, sizeof list, list);
     bool any = self->cause_count > 0;
     switch (self->verdict) {
     case diagnosis_explained:
@@ -148,7 +149,7 @@ void wording_headline(const struct diagnosis *self, char out_text[wording_size])
                      self->cause_count > 1 ? "stand" : "stands");
         } else {
             char might[wording_size / 2];
-            wording_list(self->candidates, self->candidate_count, sizeof might, might);
+            list_names(self->candidates, self->candidate_count, sizeof might, might);
             snprintf(out_text, wording_size, "Not explained: no known cause %s%s%s", might[0] ? "stands, " : "fits",
                      might, might[0] ? " might be part of it" : "");
         }
@@ -246,7 +247,7 @@ static size_t next_of_untestable(const struct diagnosis *self, size_t max, char 
         const char *what = self->input_unit ? strcmp(self->input_unit, "V") == 0 ? "voltage" : "current"
                            : self->linear   ? "force"
                                             : "torque";
-        wording_list(waiting, waiting_count, sizeof list, list);
+        list_names(waiting, waiting_count, sizeof list, list);
         snprintf(out_texts[count++], wording_size,
                  "To test for %s: record beside the %s what the controller asked for (its reference).", list, what);
     }
@@ -257,6 +258,8 @@ static size_t next_of_untestable(const struct diagnosis *self, size_t max, char 
 static size_t next_of_open(const struct diagnosis *self, size_t max, char (*out_texts)[wording_size])
 {
     size_t count = 0;
+    if (max > 0)
+        wording_closer(self, out_texts[count++]);
     for (size_t i = 0; i < self->candidate_count && count < max; i++)
         count += next_of_effect(self->candidates[i].effect, "To confirm or rule out", out_texts[count]);
     return count + next_of_untestable(self, max - count, out_texts + count);
@@ -302,10 +305,24 @@ size_t wording_next(const struct diagnosis *self, size_t max, char (*out_texts)[
     return count;
 }
 
-void wording_runs(const struct diagnosis_request *request, char out_text[wording_runs_size])
+void wording_runs(const struct run *runs, size_t count, char out_text[wording_runs_size])
 {
     size_t used = 0;
-    for (size_t i = 0; i < request->fit_count && used < wording_runs_size - 1; i++)
+    out_text[0] = '\0';
+    for (size_t i = 0; i < count && used < wording_runs_size - 1; i++)
         used += (size_t)snprintf(out_text + used, wording_runs_size - used, "%s%s", i > 0 ? ", " : "",
-                                 request->fit[i].path ? request->fit[i].path : "run");
+                                 runs[i].path ? runs[i].path : "run");
+}
+
+void wording_judged(const struct diagnosis_request *request, size_t held_from, char out_text[wording_runs_size])
+{
+    const struct run *first = &request->fit[0];
+    const char *name = first->path ? first->path : "the only run";
+    size_t n = first->period_samples;
+    if (request->validate_count > 0)
+        wording_runs(request->validate, request->validate_count, out_text);
+    else if (n > 0 && held_from % n == 0)
+        snprintf(out_text, wording_runs_size, "periods %zu to %zu of %s", held_from / n + 1, first->rows / n, name);
+    else
+        snprintf(out_text, wording_runs_size, "%s from %.4g s on", name, (double)held_from / first->sample_rate_hz);
 }

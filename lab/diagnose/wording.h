@@ -5,7 +5,7 @@
 
 #include "lab/diagnose/diagnosis.h"
 
-enum { wording_short = 32, wording_size = 1024 };
+enum { wording_short = 32, wording_size = 1024, wording_where_size = 640 };
 
 /// Names of quantities and units on a rotary or a linear axis; where the recordings have a current or a voltage and no
 /// model says what torque that makes, it stands for the torque.
@@ -24,9 +24,6 @@ void wording_in_units(const struct diagnosis *self, size_t size, char *io_text);
 /// An effect's id as words: "load bias".
 void wording_effect(int effect, char out_text[wording_short]);
 
-/// The causes' names in one row: "cogging, load bias and inertia"; "" for none.
-void wording_list(const struct diagnosis_cause *causes, size_t count, size_t size, char *out_text);
-
 /// A share as a percentage of three digits: "4.81 %"; "unknown" if it is not finite.
 void wording_percent(double share, char out_text[wording_short]);
 
@@ -42,13 +39,37 @@ void wording_gain(const struct diagnosis *self, char out_text[wording_size]);
 /// Why refitting made the error on unseen data larger, as a sentence; NULL where it did not.
 const char *wording_refit(const struct diagnosis *self);
 
+/// A part of an axis as words: "moving backward", "at speeds below 0.3 rad/s".
+void wording_range(const struct diagnosis *self, enum misfit_axis_kind axis, const struct misfit_range *range,
+                   char out_text[wording_size]);
+
+/// Where a model's misfit sits, by the axes that say most: "at 0.8..3 Hz (72 % of it), moving backward (81 %)"; "" where
+/// nothing is left, or where it is left everywhere alike.
+void wording_where(const struct diagnosis *self, const struct misfit *misfit, enum misfit_model model,
+                   char out_text[wording_size]);
+
+/// Where and how what stays unexplained lies; `reason`: why it counts as that, which may be empty.
+void wording_rest(const struct diagnosis *self, const char *reason, char out_text[wording_where_size]);
+
+/// How much stays unexplained, and where, as a sentence without its full stop.
+void wording_left(const struct diagnosis *self, char out_text[wording_size]);
+
+/// What a cause is worth on unseen data, as a sentence; "" where that is not known.
+void wording_unseen(const struct diagnosis *self, const struct diagnosis_cause *cause, char out_text[wording_size]);
+
+/// What to measure to see what has no name, as one sentence.
+void wording_closer(const struct diagnosis *self, char out_text[wording_size]);
+
 /// What to measure to test for an effect that was not tested for: a clause after "measure".
 const char *wording_measure(const struct diagnosis_untestable *untestable);
 
 enum { wording_runs_size = 512 };
 
-/// The fitted runs by their files, with commas.
-void wording_runs(const struct diagnosis_request *request, char out_text[wording_runs_size]);
+/// Runs by their files, with commas.
+void wording_runs(const struct run *runs, size_t count, char out_text[wording_runs_size]);
+
+/// What is judged on: the validation runs, or the part of the only run that is held back from row `held_from` on.
+void wording_judged(const struct diagnosis_request *request, size_t held_from, char out_text[wording_runs_size]);
 
 /// Whether the extended model is more than the refitted one: anything was found, claimed or not.
 bool wording_is_extended(const struct diagnosis *self);
