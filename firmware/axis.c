@@ -4,13 +4,13 @@
 #include "core/bytes.h"
 #include "firmware/board.h"
 
-#include "measurement.h"
+#include "excitation-dft.h"
 
 struct axis axis;
 
-static int32_t storage[FRF_BLOCK_STORAGE_WORDS(MEASUREMENT_BIN_COUNT, sample_path_channels, 2u,
-                                               MEASUREMENT_BLOCK_SAMPLES, MEASUREMENT_BLOCK_SAMPLES)];
-static int16_t block_frames[FRF_BLOCK_FRAME_SAMPLES(sample_path_channels, MEASUREMENT_BLOCK_SAMPLES)];
+static int32_t storage[FRF_BLOCK_STORAGE_WORDS(EXCITATION_DFT_BIN_COUNT, sample_path_channels, 2u,
+                                               EXCITATION_DFT_BLOCK_SAMPLES, EXCITATION_DFT_BLOCK_TERMS) +
+                       FRF_BLOCK_SPREAD_WORDS(sample_path_channels, EXCITATION_DFT_BLOCK_SAMPLES)];
 
 /* What the library costs in the interrupt is counted here, as a drive would with its cycle counter. */
 static void play(const struct belt_sample *sample, struct sample_path_output *out_output)
@@ -67,9 +67,9 @@ void axis_power_on(void)
 
 static bool has_the_lines_of(const struct msgen_table *table)
 {
-    bool same = table->bin_count == MEASUREMENT_BIN_COUNT;
+    bool same = table->bin_count == EXCITATION_DFT_BIN_COUNT;
     for (uint32_t i = 0; same && i < table->bin_count; ++i) {
-        same = msgen_table_bin(table, i) == measurement_bins[i];
+        same = msgen_table_bin(table, i) == excitation_dft_bins[i];
     }
     return same;
 }
@@ -88,7 +88,7 @@ static int32_t limit_of(float value, float counts_per_unit)
 
 enum core_status axis_prepare(const struct msgen_table *table, const struct axis_setup *setup)
 {
-    if (table->period_samples != MEASUREMENT_PERIOD_SAMPLES || table->channels != msgen_channels_max) {
+    if (table->period_samples != EXCITATION_DFT_PERIOD_SAMPLES || table->channels != msgen_channels_max) {
         return core_err_frf_period;
     }
     if (!has_the_lines_of(table)) {
@@ -106,19 +106,17 @@ enum core_status axis_prepare(const struct msgen_table *table, const struct axis
                                                .fade_in_samples = setup->fade_samples,
                                                .fade_out_samples = setup->fade_samples,
                                                .abort_samples = setup->abort_samples};
-    static const struct frf_block_config block = {.table = &measurement_block_table,
+    static const struct frf_block_config block = {.table = &excitation_dft_block_table,
                                                   .channels = sample_path_channels,
                                                   .banks = 2,
                                                   .spread = true,
                                                   .storage = storage,
-                                                  .storage_words = sizeof storage / sizeof *storage,
-                                                  .frames = block_frames,
-                                                  .frame_samples = sizeof block_frames / sizeof *block_frames};
+                                                  .storage_words = sizeof storage / sizeof *storage};
     for (unsigned c = 0; c < msgen_channels_max; ++c) {
         union core_float_bits scale = {.bits = table->scale_bits[c]};
         axis.reference_scale[c] = scale.value;
     }
-    enum core_status status = results_init(&axis.results, &measurement_block_table, 1.0f / BELT_TORQUE_COUNTS_PER_NM,
+    enum core_status status = results_init(&axis.results, &excitation_dft_block_table, 1.0f / BELT_TORQUE_COUNTS_PER_NM,
                                            1.0f / BELT_VELOCITY_COUNTS_PER_RAD_PER_S);
     return status == core_ok ? sample_path_init(&axis.path, &limits, table, &player, &block, setup->settle_periods)
                              : status;

@@ -10,14 +10,14 @@
 #include "guard/guard.h"
 #include "msgen/player.h"
 
+#include "excitation-dft.h"
 #include "excitation.h"
-#include "measurement.h"
 
 enum {
     bins_max = 200,
     channels_max = 3,
-    block = 32,
-    period = 640, /* whole blocks, and half a second's worth of counting */
+    block_max = 128,
+    part_max = 512,
     small_period = 8,
     exact_bins = 32,
 };
@@ -191,9 +191,24 @@ static void count_guard(void)
 
 // ---- DFT
 
-static int32_t coefficients[FRF_BLOCK_TABLE_WORDS(bins_max, block, block)];
-static int32_t storage[FRF_BLOCK_STORAGE_WORDS(bins_max, channels_max, 2u, block, block)];
-static int16_t kept[FRF_BLOCK_FRAME_SAMPLES(channels_max, block)];
+/* What there are lines for: anywhere, in whole blocks and not; well below the sampling rate, where they share a basis;
+ * odd ones, where the period is folded. */
+struct lines {
+    const char *name;
+    uint32_t period, highest, step;
+    struct frf_block_layout layout;
+};
+
+static const struct lines any = {"", 640, 319, 1, {32, 32, 1}};
+static const struct lines others[] = {{"any-cut/", 650, 324, 1, {32, 32, 1}},
+                                      {"below-0.1/", 2048, 204, 1, {64, 24, 1}},
+                                      {"below-0.02/", 10240, 204, 1, {128, 12, 1}},
+                                      {"odd/", 2 * part_max, 399, 2, {32, 32, 2}}};
+
+static int32_t coefficients[FRF_BLOCK_TABLE_WORDS(bins_max, block_max, 64u)];
+static int32_t storage[FRF_BLOCK_STORAGE_WORDS(bins_max, channels_max, 2u, block_max, 64u) +
+                       FRF_BLOCK_SPREAD_WORDS(channels_max, block_max)];
+static int32_t part[FRF_BLOCK_PART_WORDS(channels_max, 2u * part_max, 2u)];
 static uint32_t bins[bins_max];
 static union frf_word words[FRF_STORAGE_WORDS(exact_bins, channels_max)];
 
@@ -209,7 +224,7 @@ static void fill(int16_t *out_frame)
 static void count_frames(struct frf_block *dft, uint32_t *out_mean, uint32_t *out_longest)
 {
     int16_t frame[channels_max];
-    uint32_t all = 0;
+    uint32_t all = 0, period = dft->table.period_samples;
     fill(frame);
     *out_longest = 0;
     for (uint32_t n = 0; n < 2u * period; ++n) {
@@ -225,8 +240,8 @@ static void count_frames(struct frf_block *dft, uint32_t *out_mean, uint32_t *ou
 /* Over two periods, fed a block at a time: what an interrupt that only collects leaves to somebody else. */
 static uint32_t count_blocks(struct frf_block *dft)
 {
-    static int16_t frames[(block + 1) * channels_max];
-    uint32_t all = 0;
+    static int16_t frames[block_max * channels_max];
+    uint32_t all = 0, period = dft->table.period_samples, block = dft->table.layout.block_samples;
     for (uint32_t i = 0; i < block; ++i) {
         fill(frames + i * dft->channels);
     }
@@ -238,62 +253,97 @@ static uint32_t count_blocks(struct frf_block *dft)
     return all / (2u * period);
 }
 
-static void print_block_count(const char *what, uint32_t bin_count, uint32_t channels, uint32_t value)
+static void print_block_count(const char *what, const struct lines *lines, uint32_t bin_count, uint32_t channels,
+                              uint32_t value)
 {
     board_print("frf_block_add_i16/");
     board_print(what);
     board_print("/");
+    board_print(lines->name);
     print_u32(bin_count);
     board_print("-bins/");
     print_u32(channels);
     print_count(channels == 1u ? "-channel" : "-channels", value);
 }
 
-static void count_block(uint32_t bin_count, uint32_t channels)
+static void set_up_block(struct frf_block *dft, const struct lines *lines, uint32_t bin_count, uint32_t channels,
+                         bool spread)
 {
-    const struct frf_block_layout layout = {block, block, 1};
     struct frf_block_table table;
-    struct frf_block_config config = {.table = &table,
-                                      .channels = channels,
-                                      .banks = 2,
-                                      .storage = storage,
-                                      .storage_words = sizeof storage / sizeof *storage,
-                                      .frames = kept,
-                                      .frame_samples = sizeof kept / sizeof *kept};
+    const struct frf_block_config config = {.table = &table,
+                                            .channels = channels,
+                                            .banks = 2,
+                                            .spread = spread,
+                                            .storage = storage,
+                                            .storage_words = sizeof storage / sizeof *storage,
+                                            .part = part,
+                                            .part_words = sizeof part / sizeof *part};
+    for (uint32_t b = 0; b < bin_count; ++b) {
+        bins[b] = 1u + b * ((lines->highest - 1u) / (bin_count - 1u) / lines->step) * lines->step;
+    }
+    require(frf_block_build(coefficients, sizeof coefficients / sizeof *coefficients, bins, bin_count, lines->period,
+                            &lines->layout, &table));
+    require(frf_block_init(dft, &config));
+}
+
+/* How even the work is: what the longest call is of the mean one. */
+static void count_spread(const struct lines *lines, uint32_t bin_count, uint32_t channels)
+{
     struct frf_block dft;
     uint32_t mean, longest;
-    for (uint32_t b = 0; b < bin_count; ++b) {
-        bins[b] = 1u + b;
-    }
-    require(frf_block_build(coefficients, sizeof coefficients / sizeof *coefficients, bins, bin_count, period, &layout,
-                            &table));
-    require(frf_block_init(&dft, &config));
+    set_up_block(&dft, lines, bin_count, channels, true);
     count_frames(&dft, &mean, &longest);
-    print_block_count("at-once-longest", bin_count, channels, longest);
-    print_block_count("in-blocks-mean", bin_count, channels, count_blocks(&dft));
-    config.spread = true;
-    require(frf_block_init(&dft, &config));
-    count_frames(&dft, &mean, &longest);
-    print_block_count("spread-longest", bin_count, channels, longest);
-    print_block_count("spread-mean", bin_count, channels, mean);
+    print_block_count("spread-longest", lines, bin_count, channels, longest);
+    print_block_count("spread-mean", lines, bin_count, channels, mean);
+    print_block_count("spread-longest-percent-of-mean", lines, bin_count, channels, 100u * longest / mean);
+}
 
+static void count_reader(struct frf_block *dft)
+{
     struct frf_block_period latched;
     int64_t real, imaginary;
     uint32_t begin = board_instructions();
-    bool there = frf_block_latest(&dft, &latched);
-    uint32_t latest = since(begin);
+    bool there = frf_block_latest(dft, &latched);
+    print_count("frf_block_latest", since(begin));
     begin = board_instructions();
-    frf_block_sums(&dft, &latched, bin_count - 1u, channels - 1u, &real, &imaginary);
-    uint32_t sums = since(begin);
+    frf_block_sums(dft, &latched, bins_max - 1u, channels_max - 1u, &real, &imaginary);
+    print_count("frf_block_sums", since(begin));
     if (!there) {
         board_exit(1);
     }
+}
+
+/* With everything to be done of a block that has just been filled. */
+static void count_skip(struct frf_block *dft)
+{
+    int16_t frame[channels_max];
+    fill(frame);
+    for (uint32_t n = 0; n < dft->table.layout.block_samples; ++n) {
+        frf_block_add_i16(dft, frame, 1);
+    }
+    uint32_t begin = board_instructions();
+    frf_block_skip(dft, 1);
+    print_count("frf_block_skip/1", since(begin));
+}
+
+static void count_block(uint32_t bin_count, uint32_t channels)
+{
+    struct frf_block dft;
+    uint32_t mean, longest;
+    set_up_block(&dft, &any, bin_count, channels, false);
+    count_frames(&dft, &mean, &longest);
+    print_block_count("at-once-longest", &any, bin_count, channels, longest);
+    print_block_count("at-once-mean", &any, bin_count, channels, mean);
+    print_block_count("in-blocks-mean", &any, bin_count, channels, count_blocks(&dft));
+    count_spread(&any, bin_count, channels);
+    for (unsigned i = 0; SERVOSCOPE_FRF_LONG_MULTIPLY && i < sizeof others / sizeof *others; ++i) {
+        count_spread(&others[i], bin_count, channels);
+    }
     if (bin_count == bins_max && channels == channels_max) {
-        print_count("frf_block_latest", latest);
-        print_count("frf_block_sums", sums);
-        begin = board_instructions();
-        frf_block_skip(&dft, 1);
-        print_count("frf_block_skip/1", since(begin));
+        set_up_block(&dft, &any, bin_count, channels, true);
+        count_frames(&dft, &mean, &longest);
+        count_reader(&dft);
+        count_skip(&dft);
     }
 }
 
@@ -302,7 +352,7 @@ static uint32_t count_exact(struct frf_dft *dft)
     int16_t frame[channels_max];
     uint32_t most = 0;
     fill(frame);
-    for (uint32_t n = 0; n < MEASUREMENT_PERIOD_SAMPLES; ++n) {
+    for (uint32_t n = 0; n < EXCITATION_DFT_PERIOD_SAMPLES; ++n) {
         uint32_t begin = board_instructions();
         frf_dft_add_i16(dft, frame, 1);
         keep_most(&most, since(begin));
@@ -312,13 +362,13 @@ static uint32_t count_exact(struct frf_dft *dft)
 
 static void count_exact_channels(uint32_t channels)
 {
-    const struct frf_dft_config config = {
-        measurement_bins, exact_bins, channels, words, sizeof words / sizeof *words, 0, 0};
+    const struct frf_dft_config config = {excitation_dft_bins,          exact_bins, channels, words,
+                                          sizeof words / sizeof *words, 0,          0};
     struct frf_dft dft;
-    require(frf_dft_init_q15(&dft, &config, &measurement_twiddles_q15));
+    require(frf_dft_init_q15(&dft, &config, &excitation_dft_twiddles_q15));
     print_count(channels == 1u ? "frf_dft_add_i16/q15/32-bins/1-channel" : "frf_dft_add_i16/q15/32-bins/2-channels",
                 count_exact(&dft));
-    require(frf_dft_init_q31(&dft, &config, &measurement_twiddles_q31));
+    require(frf_dft_init_q31(&dft, &config, &excitation_dft_twiddles_q31));
     print_count(channels == 1u ? "frf_dft_add_i16/q31/32-bins/1-channel" : "frf_dft_add_i16/q31/32-bins/2-channels",
                 count_exact(&dft));
 }

@@ -42,14 +42,12 @@ cat >"$tables/model.json" <<'END'
  "sample_rate_hz": 8000}
 END
 quietly "$SERVOSCOPE" design --rate 8000 --period 2000 --lines linear:20:640:20 --limit-torque 1 --limit-velocity 15 \
-    --inertia 0.005 --iterations 50 --threads 1 --out "$tables/excitation"
+    --inertia 0.005 --iterations 50 --threads 1 --dft-header block,q15,q31 --out "$tables/excitation"
 quietly "$SERVOSCOPE" simulate --model "$tables/model.json" --table "$tables/excitation.mst" --periods 3 --out "$tables/run.csv"
 
 host=(cc -std=c11 -O2 -ffp-contract=off -fno-math-errno -Wall -Wextra -Wpedantic -Werror -DSERVOSCOPE_REAL_BITS=32
     -I. -Ilib -I"$tables")
 library=(lib/core/*.c lib/msgen/*.c lib/frf/*.c lib/guard/*.c)
-"${host[@]}" firmware/generate.c "${library[@]}" -lm -o "$tables/generate"
-"$tables/generate" "$tables/excitation.mst" 16 >"$tables/measurement.h"
 python3 firmware/record.py "$tables/run.csv" >"$tables/recording.h"
 
 # What the target has to come to.

@@ -10,8 +10,8 @@
 #include "firmware/modbus_door.h"
 #include "firmware/print.h"
 
+#include "excitation-dft.h"
 #include "excitation.h"
-#include "measurement.h"
 
 static struct can_door can_door;
 static struct modbus_door modbus_door;
@@ -34,9 +34,9 @@ static void print_float(uint32_t bits)
 static void print_response(void)
 {
     board_print("frequency_hz real imag std valid\n");
-    for (uint32_t bin = 0; bin < MEASUREMENT_BIN_COUNT; ++bin) {
+    for (uint32_t bin = 0; bin < EXCITATION_DFT_BIN_COUNT; ++bin) {
         const struct can_reading *reading = &can_door.readings[bin];
-        print_u32(measurement_bins[bin] * axis_rate_hz / MEASUREMENT_PERIOD_SAMPLES);
+        print_u32(excitation_dft_bins[bin] * axis_rate_hz / EXCITATION_DFT_PERIOD_SAMPLES);
         print_float(reading->real);
         print_float(reading->imaginary);
         print_float(reading->std);
@@ -60,7 +60,7 @@ static void print_counter(const char *name, uint32_t value)
 static uint32_t compare_buses(void)
 {
     float most = 0.0f;
-    for (uint32_t bin = 0; bin < MEASUREMENT_BIN_COUNT; ++bin) {
+    for (uint32_t bin = 0; bin < EXCITATION_DFT_BIN_COUNT; ++bin) {
         const struct modbus_record *record = &modbus_door.readings[bin];
         union core_float_bits real = {.bits = can_door.readings[bin].real},
                               imaginary = {.bits = can_door.readings[bin].imaginary};
@@ -133,6 +133,6 @@ int main(void)
     print_response();
     print_counters(difference);
     expect_counters();
-    bool all_there = modbus_door.bins_read == MEASUREMENT_BIN_COUNT && axis.results.statistics.periods > 1u;
+    bool all_there = modbus_door.bins_read == EXCITATION_DFT_BIN_COUNT && axis.results.statistics.periods > 1u;
     board_exit(expected_finish() && all_there && difference <= buses_differ_most ? 0 : 2);
 }

@@ -9,19 +9,19 @@
 #include "firmware/sample_path.h"
 #include "frf/dft.h"
 
+#include "excitation-dft.h"
 #include "excitation.h"
-#include "measurement.h"
 #include "recording.h"
 
-enum { stream_rate_hz = 8000, q15_bins = MEASUREMENT_BIN_COUNT, q31_bins = 4 };
+enum { stream_rate_hz = 8000, q15_bins = EXCITATION_DFT_BIN_COUNT, q31_bins = 4 };
 
 static struct sample_path path;
 static struct frf_dft exact_q15, exact_q31;
-static union frf_word storage_q15[FRF_STORAGE_WORDS(MEASUREMENT_BIN_COUNT, sample_path_channels)];
+static union frf_word storage_q15[FRF_STORAGE_WORDS(EXCITATION_DFT_BIN_COUNT, sample_path_channels)];
 static union frf_word storage_q31[FRF_STORAGE_WORDS(q31_bins, sample_path_channels)];
-static int32_t storage_block[FRF_BLOCK_STORAGE_WORDS(MEASUREMENT_BIN_COUNT, sample_path_channels, 2u,
-                                                     MEASUREMENT_BLOCK_SAMPLES, MEASUREMENT_BLOCK_SAMPLES)];
-static int16_t block_frames[FRF_BLOCK_FRAME_SAMPLES(sample_path_channels, MEASUREMENT_BLOCK_SAMPLES)];
+static int32_t storage_block[FRF_BLOCK_STORAGE_WORDS(EXCITATION_DFT_BIN_COUNT, sample_path_channels, 2u,
+                                                     EXCITATION_DFT_BLOCK_SAMPLES, EXCITATION_DFT_BLOCK_TERMS) +
+                             FRF_BLOCK_SPREAD_WORDS(sample_path_channels, EXCITATION_DFT_BLOCK_SAMPLES)];
 static uint32_t played[2];
 static volatile uint32_t frame;
 
@@ -47,28 +47,36 @@ static void take_sample(void)
 static enum core_status set_up(struct msgen_table *out_table)
 {
     static const struct guard_limits limits = GUARD_LIMITS_NONE;
-    const struct msgen_player_config player = {.periods = RECORDING_FRAMES / MEASUREMENT_PERIOD_SAMPLES - 1u,
+    const struct msgen_player_config player = {.periods = RECORDING_FRAMES / EXCITATION_DFT_PERIOD_SAMPLES - 1u,
                                                .fade_in_samples = 200,
                                                .fade_out_samples = 200,
                                                .abort_samples = 400};
-    const struct frf_block_config block = {.table = &measurement_block_table,
+    const struct frf_block_config block = {.table = &excitation_dft_block_table,
                                            .channels = sample_path_channels,
                                            .banks = 2,
                                            .spread = true,
                                            .storage = storage_block,
-                                           .storage_words = sizeof storage_block / sizeof *storage_block,
-                                           .frames = block_frames,
-                                           .frame_samples = sizeof block_frames / sizeof *block_frames};
-    const struct frf_dft_config q15 = {
-        measurement_bins, q15_bins, sample_path_channels, storage_q15, sizeof storage_q15 / sizeof *storage_q15, 0, 0};
-    const struct frf_dft_config q31 = {
-        measurement_bins, q31_bins, sample_path_channels, storage_q31, sizeof storage_q31 / sizeof *storage_q31, 0, 0};
+                                           .storage_words = sizeof storage_block / sizeof *storage_block};
+    const struct frf_dft_config q15 = {excitation_dft_bins,
+                                       q15_bins,
+                                       sample_path_channels,
+                                       storage_q15,
+                                       sizeof storage_q15 / sizeof *storage_q15,
+                                       0,
+                                       0};
+    const struct frf_dft_config q31 = {excitation_dft_bins,
+                                       q31_bins,
+                                       sample_path_channels,
+                                       storage_q31,
+                                       sizeof storage_q31 / sizeof *storage_q31,
+                                       0,
+                                       0};
     enum core_status status = msgen_table_open(excitation_mst, sizeof excitation_mst, out_table);
     if (status == core_ok) {
-        status = frf_dft_init_q15(&exact_q15, &q15, &measurement_twiddles_q15);
+        status = frf_dft_init_q15(&exact_q15, &q15, &excitation_dft_twiddles_q15);
     }
     if (status == core_ok) {
-        status = frf_dft_init_q31(&exact_q31, &q31, &measurement_twiddles_q31);
+        status = frf_dft_init_q31(&exact_q31, &q31, &excitation_dft_twiddles_q31);
     }
     return status == core_ok ? sample_path_init(&path, &limits, out_table, &player, &block, 0) : status;
 }
@@ -79,8 +87,8 @@ static void print_sums(const char *name, uint32_t period, uint32_t bin, int64_t 
     board_print(" ");
     print_u32(period);
     board_print(" ");
-    print_u32(measurement_bins[bin % MEASUREMENT_BIN_COUNT]);
-    board_print(bin / MEASUREMENT_BIN_COUNT == sample_path_torque ? " torque " : " velocity ");
+    print_u32(excitation_dft_bins[bin % EXCITATION_DFT_BIN_COUNT]);
+    board_print(bin / EXCITATION_DFT_BIN_COUNT == sample_path_torque ? " torque " : " velocity ");
     print_i64(real);
     board_print(" ");
     print_i64(imaginary);
@@ -99,7 +107,7 @@ static bool read_exact(const char *name, const struct frf_dft *dft, uint32_t *io
     *io_sequence = period.sequence;
     for (uint32_t channel = 0; channel < dft->channels; ++channel) {
         for (uint32_t bin = 0; bin < dft->bin_count; ++bin) {
-            print_sums(name, period.sequence, channel * MEASUREMENT_BIN_COUNT + bin,
+            print_sums(name, period.sequence, channel * EXCITATION_DFT_BIN_COUNT + bin,
                        frf_period_real(dft, &period, bin, channel), frf_period_imaginary(dft, &period, bin, channel));
         }
     }
@@ -115,9 +123,10 @@ static bool read_block(uint32_t *io_sequence)
         return false;
     }
     *io_sequence = period.sequence;
-    for (uint32_t i = 0; i < sample_path_channels * MEASUREMENT_BIN_COUNT; ++i) {
+    for (uint32_t i = 0; i < sample_path_channels * EXCITATION_DFT_BIN_COUNT; ++i) {
         int64_t real, imaginary;
-        frf_block_sums(&path.dft, &period, i % MEASUREMENT_BIN_COUNT, i / MEASUREMENT_BIN_COUNT, &real, &imaginary);
+        frf_block_sums(&path.dft, &period, i % EXCITATION_DFT_BIN_COUNT, i / EXCITATION_DFT_BIN_COUNT, &real,
+                       &imaginary);
         print_sums("block", period.sequence, i, real, imaginary);
     }
     expected_take(frf_block_is_intact(&path.dft, &period));

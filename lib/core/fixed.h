@@ -16,6 +16,26 @@ static inline int64_t core_round_shift_i64(int64_t value, unsigned shift)
     return (value + (value < 0 ? -half : half)) / ((int64_t)1 << shift);
 }
 
+/// value / 2^shift, rounded down. 0 <= shift <= 31. >> of a negative value is the implementation's choice, of its
+/// complement it is not; compilers make one shift of both.
+static inline int32_t core_shift_down_i32(int32_t value, unsigned shift)
+{
+    return value < 0 ? ~(~value >> shift) : value >> shift; // Deviation 10.1: an int32_t is two's complement
+}
+
+/// The number modulo 2^32 that an int32_t can hold. C leaves the conversion of an unsigned value above the signed
+/// maximum to the implementation, hence the detour, of which nothing is left in the object.
+static inline int32_t core_signed_i32(uint32_t value)
+{
+    return value < 0x80000000u ? (int32_t)value : (int32_t)(value - 0x80000000u) + INT32_MIN;
+}
+
+/// value / 2^32, rounded down.
+static inline int32_t core_high_word_i64(int64_t value)
+{
+    return core_signed_i32((uint32_t)((uint64_t)value >> 32));
+}
+
 /// value * factor in Q30, factor 0 .. 1: exact for 0 and 1. |product| <= 2^31 * 2^30 = 2^61.
 static inline int32_t core_scale_q30(int32_t value, int32_t factor_q30)
 {

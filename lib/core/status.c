@@ -36,7 +36,7 @@ static const struct {
     {core_err_frf_period, "period is out of range or not that of the twiddle table"},
     {core_err_frf_bins, "bins are none, too many, not ascending, or not below half the period"},
     {core_err_frf_channels, "number of channels is out of range"},
-    {core_err_frf_rails, "lower saturation threshold is not below the upper one"},
+    {core_err_frf_rails, "lower saturation threshold is not below the upper one, or one is wider than the samples"},
     {core_err_frf_block, "no such block length, or too few basis functions for the lines"},
     {core_err_guard_travel, "lower travel limit is not below the upper one"},
     {core_err_guard_velocity, "speed limit is not positive"},

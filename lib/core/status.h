@@ -44,7 +44,7 @@ enum core_status {
     core_err_frf_period = -50,   ///< N outside 4 .. SERVOSCOPE_FRF_PERIOD_MAX, or not that of the twiddle table
     core_err_frf_bins = -51,     ///< no bins, too many, not strictly ascending from 1, or at or above N/2
     core_err_frf_channels = -52, ///< not 1 .. SERVOSCOPE_FRF_CHANNELS_MAX
-    core_err_frf_rails = -53,    ///< saturation thresholds in the wrong order
+    core_err_frf_rails = -53,    ///< saturation thresholds in the wrong order, or beyond the samples' width
     core_err_frf_block = -54,    ///< no such block length, or too few basis functions for the lines
 
     core_err_guard_travel = -60,   ///< lower travel limit not below the upper one, or not a number

@@ -26,52 +26,67 @@
 extern "C" {
 #endif
 
-/// Words of int32_t: accumulators, 2 a bin, channel and bank (bins rounded up to even), per channel the vector that is
-/// worked on, and what projecting takes. Arguments are evaluated more than once.
+/// Words of int32_t: accumulators, 2 a bin, channel and bank (bins rounded up to even), per channel the block being
+/// filled, and what projecting takes. Arguments are evaluated more than once.
 #define FRF_BLOCK_STORAGE_WORDS(bins, channels, banks, L, terms)                                                       \
-    (2u * FRF_BLOCK_ROWS(bins) * (channels) * (banks) + (terms) * (channels) + ((terms) == (L) ? 0u : (L)))
+    (2u * FRF_BLOCK_ROWS(bins) * (channels) * (banks) + (L) * (channels) + ((terms) == (L) ? 0u : (terms)))
 CORE_STATIC_ASSERT(FRF_BLOCK_STORAGE_WORDS(200u, 3u, 1u, 32u, 32u) * 4u == 200u * 3u * 8u + 3u * 128u,
                    eight_bytes_a_bin_and_channel);
-/// Samples of int16_t for the block being filled; none if the period is folded.
-#define FRF_BLOCK_FRAME_SAMPLES(channels, L)    ((channels) * (L))
-/// Words of int32_t for a period of N samples folded into N/Q, whole blocks; none if it is not folded.
-#define FRF_BLOCK_PART_WORDS(channels, N, Q, L) ((channels) * (((N) / (Q) + (L)-1u) / (L) * (L)))
+/// Words of storage that come on top if the work is spread: the block that is worked on while the next one is filled.
+#define FRF_BLOCK_SPREAD_WORDS(channels, L)  ((L) * (channels))
+/// Words of int32_t for a period of N samples folded into N/Q; none if it is not folded.
+#define FRF_BLOCK_PART_WORDS(channels, N, Q) ((channels) * ((N) / (Q)))
 
-/// What the two ends need to agree on. storage, frames, part and what the table points to must outlive the object.
+/// What the two ends need to agree on. storage, part and what the table points to must outlive the object.
 struct frf_block_config {
     const struct frf_block_table *table;
     uint32_t channels; ///< 1 .. SERVOSCOPE_FRF_CHANNELS_MAX
     uint32_t banks;    ///< 1 or 2
     bool spread;       ///< work on a block while the next one arrives, evenly
-    int32_t *storage;  ///< FRF_BLOCK_STORAGE_WORDS(bins, channels, banks, L, terms) words, not initialised
+    int32_t *storage;  ///< FRF_BLOCK_STORAGE_WORDS(bins, channels, banks, L, terms) words, not initialised; if spread
+                       ///< FRF_BLOCK_SPREAD_WORDS(channels, L) more
     uint32_t storage_words;
-    int16_t *frames; ///< FRF_BLOCK_FRAME_SAMPLES(channels, L) samples, not initialised; unused if repeats > 1
-    uint32_t frame_samples;
-    int32_t *part; ///< FRF_BLOCK_PART_WORDS(channels, N, Q, L) words, not initialised; unused if repeats <= 1
+    int32_t *part; ///< FRF_BLOCK_PART_WORDS(channels, N, Q) words, not initialised; unused if repeats <= 1
     uint32_t part_words;
     int16_t rail_low, rail_high; ///< samples at or beyond count as saturated; both 0: INT16_MIN and INT16_MAX
+};
+
+/// How far the work on a block is.
+struct frf_block_run {
+    int32_t *accumulators; ///< of the next two rows, and
+    const int32_t *rows;   ///< their coefficients
+    const int32_t *data;   ///< what these are multiplied with
+    uint32_t pairs;        ///< of rows left; 0: nothing is left to do
+    uint32_t groups;       ///< of four terms: of a bin's row; of the basis's rows those that are done
+    uint32_t cost;         ///< of the next step
+    uint32_t channel;
+    bool on_bins;     ///< else on the basis
+    bool fresh, last; ///< the block is the first of its period to be worked on, its last
+    uint32_t reasons; ///< of the period, if it is the last
+    uint32_t rate;    ///< that becomes due with each frame
+    uint32_t owed;    ///< due, not done
 };
 
 /// Read-only for the application.
 struct frf_block {
     struct frf_block_table table;
     int32_t *banks[2]; ///< accumulators: channel by channel, real and imaginary of each row; the same one twice, or two
-    int32_t *work;     ///< what the bins are multiplied with, channel by channel
-    int32_t *folded;   ///< before projection; null without a basis
-    int16_t *frames;   ///< of the block being filled; or
-    int32_t *part;     ///< the folded period; null without
+    int32_t *filling,
+        *taken;         ///< folded blocks, channel by channel: that samples go into, that is worked on; may be one
+    int32_t *projected; ///< of one channel; unused without a basis
+    int32_t *part;      ///< the folded period; null without
     uint32_t bank_count, channels;
     bool spread;
-    int16_t rail_low, rail_high;
-    uint32_t repeat;             ///< part of the period that is being folded in
-    uint32_t block_start;        ///< n of the first frame of the block being filled, within the part
-    uint32_t block_frames, left; ///< frames of that block, and those still to come
-    uint32_t lost;               ///< frames of that block, its first, that were lost
-    uint32_t done;               ///< pairs of rows, of all channels, that have the vector in `work`
-    bool fresh;                  ///< no block of this period has been worked on yet
-    bool work_fresh, work_last;  ///< the block in `work` is its period's first to be worked on, its last
+    int32_t scale;                       ///< of samples in a folded block
+    uint32_t inside_first, inside_count; ///< samples between the rails
+    uint32_t block_cost;                 ///< of all channels
+    uint32_t repeat;                     ///< part of the period that is being folded in
+    uint32_t block_start;                ///< of the block being filled, within the part, after the first block's
+    uint32_t at, end;                    ///< its next frame, and past its last; of L
+    uint32_t alone;                      ///< its first frame whose counterpart lies before the period
+    bool fresh;                          ///< no block of this period has been worked on yet
+    struct frf_block_run run;
     uint32_t reasons;            ///< of the period being filled
-    uint32_t work_reasons;       ///< of the period of the block in `work`, if it is the last
     uint32_t latched_reasons[2]; ///< of the last two periods, by the last bit of (sequence - 1)
     volatile uint32_t sequence;  ///< periods completed
     volatile uint32_t begun;     ///< periods whose accumulators have been written to

@@ -30,16 +30,25 @@ static inline uint32_t sixteenth(uint32_t value)
     return value >> 4 | (value >> 31) * 0xF0000000u;
 }
 
-static void accumulate_row(int32_t *accumulator, const int32_t *rotation, const int32_t *factors, const int32_t *data,
-                           uint32_t groups)
+static void sum_row(uint32_t *io_real, uint32_t *io_imaginary, const int32_t *factors, const int32_t *data,
+                    uint32_t groups)
 {
-    uint32_t real = 8u, imaginary = 8u;
+    uint32_t real = *io_real, imaginary = *io_imaginary;
     for (uint32_t g = 0; g < groups; ++g) {
         real = add_product(real, data[4u * g], factors[8u * g]);
         imaginary = add_product(imaginary, data[4u * g + 1u], factors[8u * g + 1u]);
         real = add_product(real, data[4u * g + 2u], factors[8u * g + 2u]);
         imaginary = add_product(imaginary, data[4u * g + 3u], factors[8u * g + 3u]);
     }
+    *io_real = real;
+    *io_imaginary = imaginary;
+}
+
+static void accumulate_row(int32_t *accumulator, const int32_t *rotation, const int32_t *factors, const int32_t *data,
+                           uint32_t groups)
+{
+    uint32_t real = 8u, imaginary = 8u;
+    sum_row(&real, &imaginary, factors, data, groups);
     int32_t cosine = rotation[0], sine = rotation[1];
     int32_t real_2 = as_signed(2u * (uint32_t)accumulator[0]), imaginary_2 = as_signed(2u * (uint32_t)accumulator[1]);
     real = subtract_product(add_product(0, real_2, cosine), imaginary_2, sine) + sixteenth(real);
@@ -55,5 +64,22 @@ void frf_block_accumulate_portable(int32_t *accumulators, const int32_t *rows, c
         const int32_t *row = rows + p * (8u * groups + 4u);
         accumulate_row(accumulators + 4u * p, row + 8u * groups, row, data, groups);
         accumulate_row(accumulators + 4u * p + 2u, row + 8u * groups + 2, row + 4, data, groups);
+    }
+}
+
+void frf_block_sum_portable(int32_t *sums, const int32_t *rows, const int32_t *data, uint32_t groups, bool first)
+{
+    for (uint32_t row = 0; row < 2u; ++row) {
+        uint32_t real = first ? 8u : (uint32_t)sums[2u * row], imaginary = first ? 8u : (uint32_t)sums[2u * row + 1u];
+        sum_row(&real, &imaginary, rows + 4u * row, data, groups);
+        sums[2u * row] = as_signed(real);
+        sums[2u * row + 1u] = as_signed(imaginary);
+    }
+}
+
+void frf_block_end_sum(int32_t *sums)
+{
+    for (uint32_t i = 0; i < 4u; ++i) {
+        sums[i] = as_signed(sixteenth((uint32_t)sums[i]));
     }
 }

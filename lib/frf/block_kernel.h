@@ -5,6 +5,7 @@
 
 #include "core/config.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -27,12 +28,24 @@ extern "C" {
 typedef void frf_block_kernel(int32_t *accumulators, const int32_t *rows, const int32_t *data, uint32_t row_pairs,
                               uint32_t groups);
 
+/// Adds part of R of two rows to four sums, modulo 2^32; `first`: to 8. frf_block_end_sum() makes of them what
+/// frf_block_accumulate makes of the whole with rotations of 0, to the last bit, the order of a sum not counting.
+/// Shapes: sums 4 words, rows 8 groups words, data 4 groups words
+typedef void frf_block_sum_kernel(int32_t *sums, const int32_t *rows, const int32_t *data, uint32_t groups, bool first);
+
+/// R/16 of four sums.
+void frf_block_end_sum(int32_t *sums);
+
 frf_block_kernel frf_block_accumulate_portable;
+frf_block_sum_kernel frf_block_sum_portable;
 #if SERVOSCOPE_FRF_ARMV7EM
 frf_block_kernel frf_block_accumulate_armv7em;
+frf_block_sum_kernel frf_block_sum_armv7em;
 #define FRF_BLOCK_ACCUMULATE frf_block_accumulate_armv7em
+#define FRF_BLOCK_SUM        frf_block_sum_armv7em
 #else
 #define FRF_BLOCK_ACCUMULATE frf_block_accumulate_portable
+#define FRF_BLOCK_SUM        frf_block_sum_portable
 #endif
 
 #ifdef __cplusplus

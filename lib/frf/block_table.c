@@ -127,11 +127,13 @@ static bool build_row(int32_t *rows, int32_t *basis, const struct frf_block_tabl
     return true;
 }
 
-/* The last block's centre is (blocks - 1) L + (L - 1)/2 samples after n = 0 of the folded period. */
+/* The last block's centre is (blocks - 1) L + (L - 1)/2 samples after the first one's begin, which is the zeros in front
+ * before n = 0 of the folded period. */
 static void build_restore(int32_t *restore, const struct frf_block_table *table)
 {
     uint32_t block = table->layout.block_samples, period = table->period_samples;
-    uint64_t halves = 2u * (uint64_t)((table->part_samples - 1u) / block) * block + block - 1u;
+    uint32_t last = (table->part_samples + table->lead_samples - 1u) / block * block - table->lead_samples;
+    uint64_t halves = 2u * (uint64_t)last + block - 1u;
     for (uint32_t b = 0; b < table->bin_count; ++b) {
         restore[2u * b] = q31(cosine_of_halves(halves * table->bins[b], period));
         restore[2u * b + 1u] = q31(sine_of_halves(halves * table->bins[b], period));
@@ -251,7 +253,7 @@ static enum core_status check(const struct frf_block_table *table)
 static enum core_status set_up(struct frf_block_table *self, const uint32_t *bins, uint32_t bin_count,
                                uint32_t period_samples, const struct frf_block_layout *layout)
 {
-    struct frf_block_table table = {NULL, NULL, NULL, bins, bin_count, period_samples, 0, false, *layout, 0};
+    struct frf_block_table table = {NULL, NULL, NULL, bins, bin_count, period_samples, 0, 0, false, *layout, 0};
     table.layout.repeats = layout->repeats > 1u ? layout->repeats : 1u;
     table.part_samples = period_samples / table.layout.repeats;
     table.alternate = bin_count > 0 && bins[0] % table.layout.repeats != 0u && table.layout.repeats % 2u == 0u;
@@ -259,6 +261,10 @@ static enum core_status set_up(struct frf_block_table *self, const uint32_t *bin
     if (status != core_ok) {
         return status;
     }
+    /* What the blocks have more than there are samples is cut off the first and the last in halves: then each is filled
+     * in at least half of L, which is the time for the work on the one before. */
+    uint32_t rest = table.part_samples % layout->block_samples;
+    table.lead_samples = rest == 0 ? 0 : (layout->block_samples - rest) / 2u;
     while (gain_fits(&table, table.gain_shift + 1u)) {
         ++table.gain_shift;
     }

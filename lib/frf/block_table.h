@@ -49,6 +49,7 @@ struct frf_block_table {
     const uint32_t *bins;   ///< of the K bins
     uint32_t bin_count, period_samples;
     uint32_t part_samples; ///< N/Q
+    uint32_t lead_samples; ///< zeros in front of the first block; as many, or one more, end the last
     bool alternate;        ///< every other part of the period is subtracted
     struct frf_block_layout layout;
     uint32_t gain_shift; ///< accumulators are 2^(gain_shift - 1) times the sum: as large as any samples allow

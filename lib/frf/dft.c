@@ -24,7 +24,16 @@ enum core_status frf_check_bins(const uint32_t *bins, uint32_t bin_count, uint32
     return core_ok;
 }
 
-static enum core_status check_config(const struct frf_dft_config *config, uint32_t period)
+static enum core_status check_rails(const struct frf_dft_config *config, enum frf_number number)
+{
+    bool has_rails = config->rail_low != 0 || config->rail_high != 0;
+    int32_t low = number == frf_number_q23 ? FRF_I24_MIN : INT16_MIN;
+    int32_t high = number == frf_number_q23 ? FRF_I24_MAX : INT16_MAX;
+    bool in_order = low <= config->rail_low && config->rail_low < config->rail_high && config->rail_high <= high;
+    return has_rails && !in_order ? core_err_frf_rails : core_ok;
+}
+
+static enum core_status check_config(const struct frf_dft_config *config, uint32_t period, enum frf_number number)
 {
     if (!config || !config->bins || !config->storage) {
         return core_err_argument;
@@ -42,8 +51,7 @@ static enum core_status check_config(const struct frf_dft_config *config, uint32
     if (config->storage_words < FRF_STORAGE_WORDS(config->bin_count, config->channels)) {
         return core_err_storage;
     }
-    bool has_rails = config->rail_low != 0 || config->rail_high != 0;
-    return has_rails && config->rail_low >= config->rail_high ? core_err_frf_rails : core_ok;
+    return check_rails(config, number);
 }
 
 enum core_status frf_dft_set_up(struct frf_dft *self, const struct frf_dft_config *config, uint32_t period_samples,
@@ -52,7 +60,7 @@ enum core_status frf_dft_set_up(struct frf_dft *self, const struct frf_dft_confi
     if (!self) {
         return core_err_argument;
     }
-    enum core_status status = check_config(config, period_samples);
+    enum core_status status = check_config(config, period_samples, number);
     if (status != core_ok) {
         return status;
     }
@@ -69,8 +77,8 @@ enum core_status frf_dft_set_up(struct frf_dft *self, const struct frf_dft_confi
     self->period_samples = period_samples;
     self->bin_count = config->bin_count;
     self->channels = config->channels;
-    self->rail_low = has_rails ? config->rail_low : INT16_MIN;
-    self->rail_high = has_rails ? config->rail_high : INT16_MAX;
+    self->rail_low = has_rails ? config->rail_low : number == frf_number_q23 ? FRF_I24_MIN : INT16_MIN;
+    self->rail_high = has_rails ? config->rail_high : number == frf_number_q23 ? FRF_I24_MAX : INT16_MAX;
     self->sequence = 0;
     self->latched_reasons[0] = self->latched_reasons[1] = 0;
     self->err.lost = self->err.saturated = self->err.late = self->err.not_finite = self->err.wrong_type = 0;

@@ -7,13 +7,15 @@
 /// loss at low bins, no dependence on how the samples are cut into chunks. The integer variants are exact sums of
 /// integers, bit-identical on every machine:
 ///
-///     variant  samples, table, accumulator   arithmetic alone, worst bin, N = 2000 / 16384 / 65536
-///     q15      i16, i16, i64                 >= 100 / 108 / 115 dB
-///     q31      i16, i32, i64                 >= 190 / 200 / 205 dB
-///     f32      float, float, float           >= 125 / 118 / 115 dB   (partial sums of SERVOSCOPE_FRF_BLOCK samples)
+///     variant  samples, factors, accumulator  arithmetic alone, worst bin, N = 2000 / 16384 / 65536
+///     q15      i16, i16, i64                  >= 100 / 108 / 115 dB
+///     q31      i16, i32, i64                  >= 190 / 200 / 205 dB
+///     q23      24 bits, 24 bits, i64          >= 141 / 156 / 163 dB
+///     f32      float, float, float            >= 125 / 118 / 115 dB   (partial sums of SERVOSCOPE_FRF_BLOCK samples)
 ///
-/// (tests/unit/test_frf_dft.c prints and checks them.) Cost: 2 K C multiply-accumulates a sample for K bins and C
-/// channels; the channels share the table look-up. Feed blocks rather than single samples: a block keeps a bin's sums
+/// (tests/unit/test_frf_dft.c and test_frf_i24.c print and check them.) The factors come from a full table, or from a
+/// shorter one that takes more time (frf/twiddle.h): a quarter, with the same sums, or two levels. Cost: 2 K C
+/// multiply-accumulates a sample for K bins and C channels; the channels share the table look-up. Feed blocks rather than single samples: a block keeps a bin's sums
 /// in registers. On cores with a long multiply frf/block.h is six to thirty times cheaper, at 100 dB.
 ///
 /// One writer (the interrupt) feeds; at the end of a period the sums are latched by switching between two banks,
@@ -39,7 +41,7 @@ enum frf_reason {
     frf_reason_saturated = 2,   ///< a sample reached a rail of its converter
     frf_reason_late = 4,        ///< the sample path was late: the samples are not equally spaced
     frf_reason_application = 8, ///< marked by the application: fading, aborting, tripped, settling
-    frf_reason_wrong_type = 16, ///< float samples fed to an integer DFT, or the reverse
+    frf_reason_wrong_type = 16, ///< samples of another type than the DFT's
     frf_reason_not_finite = 32, ///< a float sample was infinite or NaN
     frf_reason_count = 6
 };
@@ -61,7 +63,10 @@ CORE_STATIC_ASSERT(sizeof(union frf_word) == 8, storage_word_is_8_bytes);
 CORE_STATIC_ASSERT(FRF_STORAGE_WORDS(1u, 1u) == 5u, storage_of_one_bin);
 CORE_STATIC_ASSERT(FRF_STORAGE_WORDS(64u, 3u) * 8u == 64u * 4u + 64u * 3u * 2u * 2u * 8u, storage_of_64_bins);
 
-enum frf_number { frf_number_q15, frf_number_q31, frf_number_f32 };
+enum frf_number { frf_number_q15, frf_number_q31, frf_number_f32, frf_number_q23 };
+
+#define FRF_I24_MIN (-8388608)
+#define FRF_I24_MAX 8388607
 
 struct frf_dft;
 /// Adds `count` frames, all in one period; `fresh`: they begin a period, the old sums do not matter.
@@ -74,7 +79,7 @@ struct frf_dft_config {
     uint32_t channels;       ///< 1 .. SERVOSCOPE_FRF_CHANNELS_MAX
     union frf_word *storage; ///< FRF_STORAGE_WORDS(bin_count, channels) words, not initialised
     uint32_t storage_words;
-    int16_t rail_low, rail_high; ///< samples at or beyond count as saturated; both 0: INT16_MIN and INT16_MAX
+    int32_t rail_low, rail_high; ///< integer samples at or beyond count as saturated; both 0: the ends of 16 or 24 bits
 };
 
 /// Read-only for the application.
@@ -85,12 +90,21 @@ struct frf_dft {
     frf_kernel *kernel;
     union {
         struct frf_twiddles_q15 q15;
+        struct frf_twiddles_q23 q23;
         struct frf_twiddles_q31 q31;
         struct frf_twiddles_f32 f32;
+        struct frf_quarter_q15 quarter_q15;
+        struct frf_quarter_q23 quarter_q23;
+        struct frf_quarter_q31 quarter_q31;
+        struct frf_quarter_f32 quarter_f32;
+        struct frf_two_level_q15 two_level_q15;
+        struct frf_two_level_q23 two_level_q23;
+        struct frf_two_level_q31 two_level_q31;
+        struct frf_two_level_f32 two_level_f32;
     } twiddles;
     enum frf_number number;
     uint32_t period_samples, bin_count, channels;
-    int16_t rail_low, rail_high;
+    int32_t rail_low, rail_high;
     uint32_t position;           ///< n of the next sample, 0 .. N-1
     volatile uint32_t sequence;  ///< periods completed; its last bit is the bank being filled
     uint32_t reasons;            ///< of the period being filled
@@ -105,22 +119,55 @@ struct frf_dft {
 };
 
 /// Sets up a DFT with the arithmetic of its twiddle table, at n = 0 of its first period.
-/// Range:    |sum| <= 2^15 (2^31 - 1) 2^16 < 2^62 for q31, < 2^46 for q15: no overflow for any samples
+/// Range:    |sum| <= 2^15 (2^31 - 1) 2^16 < 2^62 for q31, 2^23 (2^23 - 1) 2^16 < 2^62 for q23, < 2^46 for q15: no
+///           overflow for any samples
 /// Errors:   core_err_argument, core_err_storage, core_err_frf_period, _bins, _channels, _rails; self untouched then
 /// Lifetime: storage and the table must outlive self; config and config->bins only during the call
-/// Test:     tests/unit/test_frf_dft.c
+/// Test:     tests/unit/test_frf_dft.c, test_frf_i24.c
 enum core_status frf_dft_init_q15(struct frf_dft *self, const struct frf_dft_config *config,
                                   const struct frf_twiddles_q15 *twiddles);
+enum core_status frf_dft_init_q23(struct frf_dft *self, const struct frf_dft_config *config,
+                                  const struct frf_twiddles_q23 *twiddles);
 enum core_status frf_dft_init_q31(struct frf_dft *self, const struct frf_dft_config *config,
                                   const struct frf_twiddles_q31 *twiddles);
 enum core_status frf_dft_init_f32(struct frf_dft *self, const struct frf_dft_config *config,
                                   const struct frf_twiddles_f32 *twiddles);
 
-/// Adds `count` frames of `channels` samples each; any count, any cut. Latches at each end of a period.
+/// The same over a quarter of a period: every sum is the full table's, to the last bit.
+/// Test: tests/unit/test_frf_twiddle.c
+enum core_status frf_dft_init_quarter_q15(struct frf_dft *self, const struct frf_dft_config *config,
+                                          const struct frf_quarter_q15 *quarter);
+enum core_status frf_dft_init_quarter_q23(struct frf_dft *self, const struct frf_dft_config *config,
+                                          const struct frf_quarter_q23 *quarter);
+enum core_status frf_dft_init_quarter_q31(struct frf_dft *self, const struct frf_dft_config *config,
+                                          const struct frf_quarter_q31 *quarter);
+enum core_status frf_dft_init_quarter_f32(struct frf_dft *self, const struct frf_dft_config *config,
+                                          const struct frf_quarter_f32 *quarter);
+
+/// The same over a two-level table. Sums are exact sums of integers still, the same on every machine; the factors are
+/// others than the full table's, by no more than frf/twiddle.h says.
+/// Accuracy: arithmetic alone, worst bin, N = 2000 / 16384 / 65536: q15, q23 and f32 as from the full table, q31
+///           >= 183 / 186 / 189 dB
+/// Test:     tests/unit/test_frf_twiddle.c
+enum core_status frf_dft_init_two_level_q15(struct frf_dft *self, const struct frf_dft_config *config,
+                                            const struct frf_two_level_q15 *table);
+enum core_status frf_dft_init_two_level_q23(struct frf_dft *self, const struct frf_dft_config *config,
+                                            const struct frf_two_level_q23 *table);
+enum core_status frf_dft_init_two_level_q31(struct frf_dft *self, const struct frf_dft_config *config,
+                                            const struct frf_two_level_q31 *table);
+enum core_status frf_dft_init_two_level_f32(struct frf_dft *self, const struct frf_dft_config *config,
+                                            const struct frf_two_level_f32 *table);
+
+/// Adds `count` frames of `channels` samples each to a q15 or q31 variant; any count, any cut. Latches at each end of a
+/// period.
 /// Exactness: integer variants exact; f32 independent of the cut as well (the partial sums are kept between calls)
 /// Errors:    none; saturated samples are added, counted, and make the period invalid
 /// Cost:      2 K C multiply-accumulates a frame; interrupt-safe, one caller per object
 void frf_dft_add_i16(struct frf_dft *self, const int16_t *frames, uint32_t count);
+
+/// The same for the q23 variant: samples of 24 bits, with their sign extended. A frame with a sample that 24 bits do not
+/// hold counts as saturated, and as zeros.
+void frf_dft_add_i24(struct frf_dft *self, const int32_t *frames, uint32_t count);
 
 /// The same for the f32 variant. A frame with a sample that is not finite counts as zeros and makes the period invalid.
 void frf_dft_add_f32(struct frf_dft *self, const float *frames, uint32_t count);

@@ -1,53 +1,17 @@
 /* SPDX-License-Identifier: MIT */
-/* Float products are summed in partial sums of SERVOSCOPE_FRF_BLOCK samples, and these into the total: rounding then
- * grows with the block and with the number of blocks, not with the period. Blocks begin at multiples of their length
- * within the period wherever the caller cuts, so the cut does not change a bit of the result. */
 #include "core/bytes.h"
 #include "core/fixed.h"
-#include "frf/kernel.h"
+#include "frf/dft.h"
 
-static inline void accumulate(union frf_word *partial, const float *frames, uint32_t channels, float cosine, float sine)
+static inline void look_up(const struct frf_twiddles_f32 *table, uint32_t index, float *out_cosine, float *out_sine)
 {
-    for (uint32_t c = 0; c < channels; ++c) {
-        partial[c].pair[0] += frames[c] * cosine;
-        partial[c].pair[1] -= frames[c] * sine;
-    }
+    *out_cosine = table->cosine[index];
+    *out_sine = table->sine[index];
 }
 
-static void flush(union frf_word *total, union frf_word *partial, uint32_t channels)
-{
-    for (uint32_t c = 0; c < channels; ++c) {
-        for (unsigned part = 0; part < 2; ++part) {
-            total[c].pair[part] += partial[c].pair[part];
-            partial[c].pair[part] = 0.0f;
-        }
-    }
-}
-
-static void add(struct frf_dft *self, const void *frames, uint32_t count, bool fresh)
-{
-    const struct frf_twiddles_f32 twiddles = self->twiddles.f32;
-    for (uint32_t b = 0; b < self->bin_count; ++b) {
-        const float *samples = (const float *)frames;
-        union frf_word *bin = &self->bins[b / 2u];
-        union frf_word *total = frf_active_bank(self) + b * self->channels;
-        union frf_word *partial = self->partial + b * self->channels;
-        uint32_t step = bin->bins[b % 2u].step, index = bin->bins[b % 2u].index;
-        for (uint32_t c = 0; fresh && c < self->channels; ++c) {
-            total[c].pair[0] = total[c].pair[1] = 0.0f;
-            partial[c].pair[0] = partial[c].pair[1] = 0.0f;
-        }
-        for (uint32_t n = self->position + 1u; n <= self->position + count; ++n) {
-            accumulate(partial, samples, self->channels, twiddles.cosine[index], twiddles.sine[index]);
-            samples += self->channels;
-            index = frf_next_index(index, step, twiddles.period_samples);
-            if (n % SERVOSCOPE_FRF_BLOCK == 0 || n == self->period_samples) {
-                flush(total, partial, self->channels);
-            }
-        }
-        bin->bins[b % 2u].index = (uint16_t)index;
-    }
-}
+#define FRF_TABLE  struct frf_twiddles_f32
+#define FRF_MEMBER f32
+#include "frf/dft_float.h"
 
 static bool frame_is_finite(const float *frame, uint32_t channels)
 {

@@ -4,7 +4,7 @@
 
 void frf_dft_add_i16(struct frf_dft *self, const int16_t *frames, uint32_t count)
 {
-    if (self->number == frf_number_f32) {
+    if (self->number != frf_number_q15 && self->number != frf_number_q31) {
         self->err.wrong_type = core_count_up(self->err.wrong_type);
         frf_dft_mark(self, frf_reason_wrong_type);
         return;

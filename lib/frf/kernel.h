@@ -16,6 +16,9 @@ enum core_status frf_check_bins(const uint32_t *bins, uint32_t bin_count, uint32
 enum core_status frf_dft_set_up(struct frf_dft *self, const struct frf_dft_config *config, uint32_t period_samples,
                                 enum frf_number number, frf_kernel *kernel);
 
+/// Whether a table can be built: core_err_argument (null), core_err_frf_period.
+enum core_status frf_check_table(const void *storage, uint32_t period, const void *out_table);
+
 /// Cuts frames of `frame_bytes` at the ends of periods, runs the kernel on each piece, latches.
 void frf_dft_feed(struct frf_dft *self, const void *frames, uint32_t frame_bytes, uint32_t count);
 

@@ -109,7 +109,9 @@ struct frf_complex frf_period_value(const struct frf_dft *dft, const struct frf_
         value.imaginary = (core_real)word->pair[1];
         return value;
     }
-    core_real one = dft->number == frf_number_q15 ? (core_real)FRF_Q15_ONE : (core_real)FRF_Q31_ONE;
+    core_real one = dft->number == frf_number_q15   ? (core_real)FRF_Q15_ONE
+                    : dft->number == frf_number_q23 ? (core_real)FRF_Q23_ONE
+                                                    : (core_real)FRF_Q31_ONE;
     value.real = (core_real)frf_period_real(dft, period, bin, channel) / one;
     value.imaginary = (core_real)frf_period_imaginary(dft, period, bin, channel) / one;
     return value;

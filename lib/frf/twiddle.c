@@ -37,15 +37,18 @@ static uint32_t cosine_offset(uint32_t period)
     return period % 4u == 0u ? period / 4u : period;
 }
 
-static enum core_status check(const void *storage, uint32_t words, uint32_t period, const void *out)
+enum core_status frf_check_table(const void *storage, uint32_t period, const void *out_table)
 {
-    if (!storage || !out) {
+    if (!storage || !out_table) {
         return core_err_argument;
     }
-    if (period < 4u || period > SERVOSCOPE_FRF_PERIOD_MAX) {
-        return core_err_frf_period;
-    }
-    return words < FRF_TWIDDLE_WORDS(period) ? core_err_storage : core_ok;
+    return period < 4u || period > SERVOSCOPE_FRF_PERIOD_MAX ? core_err_frf_period : core_ok;
+}
+
+static enum core_status check(const void *storage, uint32_t words, uint32_t period, const void *out_twiddles)
+{
+    enum core_status status = frf_check_table(storage, period, out_twiddles);
+    return status == core_ok && words < FRF_TWIDDLE_WORDS(period) ? core_err_storage : status;
 }
 
 enum core_status frf_twiddles_build_q15(int16_t *storage, uint32_t words, uint32_t period_samples,
@@ -57,6 +60,22 @@ enum core_status frf_twiddles_build_q15(int16_t *storage, uint32_t words, uint32
     }
     for (uint32_t i = 0; i < FRF_TWIDDLE_WORDS(period_samples); ++i) {
         storage[i] = (int16_t)round(FRF_Q15_ONE * entry_of(i, period_samples));
+    }
+    out_twiddles->sine = storage;
+    out_twiddles->cosine = storage + cosine_offset(period_samples);
+    out_twiddles->period_samples = period_samples;
+    return core_ok;
+}
+
+enum core_status frf_twiddles_build_q23(int32_t *storage, uint32_t words, uint32_t period_samples,
+                                        struct frf_twiddles_q23 *out_twiddles)
+{
+    enum core_status status = check(storage, words, period_samples, out_twiddles);
+    if (status != core_ok) {
+        return status;
+    }
+    for (uint32_t i = 0; i < FRF_TWIDDLE_WORDS(period_samples); ++i) {
+        storage[i] = (int32_t)round(FRF_Q23_ONE * entry_of(i, period_samples));
     }
     out_twiddles->sine = storage;
     out_twiddles->cosine = storage + cosine_offset(period_samples);
