@@ -227,23 +227,12 @@ static void choose_gain(struct work *w, struct diagnosis *d)
                      d->linear ? "masses" : "inertias", d->input_unit);
 }
 
-/// How columns got their names where nobody said it.
-static void say_names(const struct diagnosis_request *request, struct diagnosis *d)
-{
-    for (size_t i = 0; i < request->fit_count + request->validate_count; i++) {
-        const struct run *run = i < request->fit_count ? &request->fit[i] : &request->validate[i - request->fit_count];
-        const char *names = run_key(run, "columns_named"), *first = run_key(&request->fit[0], "columns_named");
-        if (names && (i == 0 || !first || strcmp(names, first) != 0))
-            oddities_add(&d->oddities, "%s: columns were named by the units in their names: --map %s", run->path,
-                         names);
-    }
-}
-
 /// What is odd about the recordings, and whether they can be of the drive that the model is of.
 static int look_at_oddities(const struct diagnosis_request *request, const struct work *w, struct diagnosis *d,
                             struct error *out_error)
 {
-    say_names(request, d);
+    oddities_of_names(request->fit, request->fit_count, NULL, &d->oddities);
+    oddities_of_names(request->validate, request->validate_count, &request->fit[0], &d->oddities);
     for (size_t i = 0; i < w->fit_count + w->validate_count; i++) {
         if (d->held_back && i == w->fit_count)
             continue; // of the same run as the first
@@ -613,8 +602,10 @@ static void list_causes(const struct work *w, struct diagnosis *d, const struct 
         bool stands = judgement->stands[e];
         size_t *count = stands ? &d->cause_count : &d->candidate_count;
         struct diagnosis_cause *list = stands ? d->causes : d->candidates;
-        if (*count < diagnosis_causes_max)
-            describe_cause(w, d, h, e, &list[(*count)++]);
+        if (*count == diagnosis_causes_max)
+            continue;
+        describe_cause(w, d, h, e, &list[*count]);
+        *count += stands || list[*count].evidence > 0.0; // what the fit does better without is no candidate
     }
     add_finding(&w->recordings[0], d);
     qsort(d->causes, d->cause_count, sizeof d->causes[0], stronger);
@@ -704,8 +695,9 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     const double clearly = 1.2;
     struct judge_validation seen = {
         .mean_rms = d->extended.mean_rms,
-        .worse = d->extended.validation_nrmse > clearly * d->refitted.validation_nrmse &&
-                 d->extended.validation_nrmse > clearly * d->noise_floor_nrmse,
+        .worse = d->extended.validation_nrmse > clearly * d->noise_floor_nrmse &&
+                 (d->extended.validation_nrmse > clearly * d->refitted.validation_nrmse ||
+                  d->extended.validation_nrmse > 1.0), // no model at all would be closer
     };
     if (!judge_structure(&w->validate_data, &d->extended_model, &seen.over_time) ||
         !judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, &seen, &judgement))

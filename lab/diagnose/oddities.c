@@ -372,6 +372,18 @@ const char *oddities_unit(double factor, bool linear, bool motion, double *out_s
     return NULL;
 }
 
+void oddities_of_names(const struct run *runs, size_t count, const struct run *like, struct oddities *io_oddities)
+{
+    const char *said = like ? run_key(like, "columns_named") : NULL;
+    for (size_t i = 0; i < count; i++) {
+        const char *names = run_key(&runs[i], "columns_named");
+        if (names && (!said || strcmp(names, said) != 0))
+            oddities_add(io_oddities, "%s: columns were named by the units in their names: --map %s", path_of(&runs[i]),
+                         names);
+        said = names ? names : said;
+    }
+}
+
 /// Torque over acceleration, both without their mean; 0 if they do not go together at all.
 static double measured_inertia(const struct recording *r)
 {

@@ -37,6 +37,9 @@ size_t oddities_period(const struct run *run, const double *torque, struct oddit
 /// `motion`: of an angle or a position, else of a speed.
 const char *oddities_unit(double factor, bool linear, bool motion, double *out_scale);
 
+/// How columns got their names where nobody said it; not again where it is as in `like` (NULL: no such run).
+void oddities_of_names(const struct run *runs, size_t count, const struct run *like, struct oddities *io_oddities);
+
 /// Whether motion and torque go together as a model's inertia says: least squares of torque on acceleration.
 /// Errors: error_refused if the factor between the two is that of a unit, or above 100; a sentence if it is
 /// merely large; how large may be more for a model that is not rigid

@@ -36,7 +36,8 @@ void wording_headline(const struct diagnosis *self, char out_text[wording_size])
 /// What the verdict is worth: how far each model is off on data the fit has not seen, and what the noise allows.
 void wording_gain(const struct diagnosis *self, char out_text[wording_size]);
 
-/// Why refitting made the error on unseen data larger, as a sentence; NULL where it did not.
+/// What is strange about the errors on unseen data, as a sentence: refitting made them larger, or no model at all would
+/// be closer; NULL where nothing is.
 const char *wording_refit(const struct diagnosis *self);
 
 /// A part of an axis as words: "moving backward", "at speeds below 0.3 rad/s".

@@ -106,15 +106,18 @@ void wording_rest(const struct diagnosis *self, const char *reason, char out_tex
 
 void wording_left(const struct diagnosis *self, char out_text[wording_size])
 {
-    const double next_to_nothing = 0.005;
-    char share[wording_short];
+    const double next_to_nothing = 0.005, noisy = 1.25;
+    char share[wording_short], times[2 * wording_short] = "";
+    double left = fmax(self->extended.mean_rms, sqrt(fmax(self->fit_misfit, 0.0)));
+    if (left > noisy)
+        snprintf(times, sizeof times, " (%.3g times what noise makes)", left);
     wording_percent(self->unexplained_share, share);
-    if (self->unexplained_share < next_to_nothing)
+    if (self->unexplained_share < next_to_nothing && !times[0])
         snprintf(out_text, wording_size, "On average next to nothing of the given model's misfit stays (%s), but %s",
                  share, self->where[0] ? self->where : "what it is made of is not known");
     else
-        snprintf(out_text, wording_size, "%s of the given model's misfit stays%s%s", share, self->where[0] ? ": " : "",
-                 self->where);
+        snprintf(out_text, wording_size, "%s of the given model's misfit stays%s%s%s", share, times,
+                 self->where[0] ? ": " : "", self->where);
 }
 
 void wording_unseen(const struct diagnosis *self, const struct diagnosis_cause *cause, char out_text[wording_size])

@@ -378,7 +378,15 @@ static int open_drive(struct loop *self, struct error *out_error)
         .following_error_rad = plan->following_error_rad,
     };
     enum drive_status status = self->drive->operations->open(self->drive->self, &configuration);
-    return status == drive_ok ? 0 : note_drive_failure(self, "open", status, out_error);
+    if (status != drive_ok) {
+        return note_drive_failure(self, "open", status, out_error);
+    }
+    // To open takes seconds on a real drive. Who wanted no more meanwhile does not want it under torque.
+    if (plan->stop_requested && *plan->stop_requested) {
+        note_end(self, measure_interrupted, "interrupted by the user before the axis was armed");
+        return error_set(out_error, error_refused, "stopped early: %s", self->report->stopped_by);
+    }
+    return 0;
 }
 
 static int prepare(struct loop *self, struct error *out_error)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/measure/report.h"
 
+#include "lab/measure/drift.h"
 #include "lab/measure/report_parts.h"
 #include "lab/measure/table_value.h"
 
@@ -352,6 +353,43 @@ static void add_spectrum(struct page *page, const struct measure_summary *summar
                         summary->table_amplitude, what);
 }
 
+/// Later half of the counted periods against the earlier half.
+static void add_drift(struct page *page, const struct measure_summary *summary)
+{
+    const struct report_words *words = report_words_of(summary->run->linear);
+    struct measure_drift drift;
+    struct figure figure;
+    page_add_section(page, "Whether it stayed the same");
+    if (!measure_drift_find(summary, &drift)) {
+        page_add_paragraph(page, "Memory was short for this section.");
+        return;
+    }
+    if (!drift.over_two_std[0]) {
+        page_add_paragraph(page,
+                           "Four counted periods without lost samples would be needed to compare the end with the "
+                           "beginning; there %s %zu.",
+                           drift.periods[0] + drift.periods[1] == 1 ? "is" : "are",
+                           drift.periods[0] + drift.periods[1]);
+        return;
+    }
+    page_add_paragraph(
+        page,
+        "From the first %zu counted periods to the last %zu, the %s changes by more than 2 std at %zu of "
+        "%zu lines, the %s at %zu; noise alone would do that at about %.2g %% of them.",
+        drift.periods[0], drift.periods[1], words->name[measure_torque], drift.beyond[measure_torque], drift.line_count,
+        words->name[measure_velocity], drift.beyond[measure_velocity], 100.0 * drift.chance);
+    figure_start(&figure, "frequency in Hz", axis_log);
+    struct figure_panel *panel = figure_add_panel(&figure, "change over 2 std, end less beginning", axis_log);
+    for (size_t q = 0; q <= measure_velocity; q++) {
+        figure_add_points(panel, words->name[q], drift.line_count, summary->frequency_hz, drift.over_two_std[q]);
+    }
+    figure_add_limit(panel, "1: within 2 std", 1.0);
+    page_add_figure(page, &figure,
+                    "Difference of the means over both halves of the measurement at each line, over 2 std of it, from "
+                    "the scatter of the periods in each half.");
+    measure_drift_free(&drift);
+}
+
 void measure_page_sections(struct page *page, const struct measure_summary *summary,
                            const struct measure_report *report)
 {
@@ -366,4 +404,5 @@ void measure_page_sections(struct page *page, const struct measure_summary *summ
     add_level(page, summary);
     add_settling(page, summary);
     add_spectrum(page, summary);
+    add_drift(page, summary);
 }

@@ -21,7 +21,8 @@ struct histogram {
     double bins[bins_max];
 };
 
-double report_key_number(const struct run *run, const char *key)
+/// A run's key as a number; NaN if it is not there.
+static double key_number(const struct run *run, const char *key)
 {
     const char *text = run_key(run, key);
     return text ? strtod(text, NULL) : NAN;
@@ -128,7 +129,7 @@ static void add_histograms(struct page *page, const struct run *run)
 void report_add_bus(struct page *page, const struct run *run)
 {
     const char *rights = run_key(run, "real_time");
-    const double load = report_key_number(run, "bus_load");
+    const double load = key_number(run, "bus_load");
     const char *drive = run_key(run, "drive");
     page_add_section(page, "Bus timing");
     if (!rights) {
@@ -142,13 +143,13 @@ void report_add_bus(struct page *page, const struct run *run)
         return;
     }
     page_start_pairs(page);
-    page_add_pair(page, "bus", "%.4g Mbit/s, planned load %.0f %% of it", 1e-6 * report_key_number(run, "bus_bitrate"),
+    page_add_pair(page, "bus", "%.4g Mbit/s, planned load %.0f %% of it", 1e-6 * key_number(run, "bus_bitrate"),
                   100.0 * load);
     page_add_pair(page, "real-time rights", "%s", rights);
-    page_add_pair(page, "SYNCs late by more than half a period", "%.0f", report_key_number(run, "syncs_late"));
-    page_add_pair(page, "frames not sent", "%.0f", report_key_number(run, "frames_unsent"));
-    page_add_pair(page, "frames lost on arrival", "%.0f", report_key_number(run, "frames_lost"));
-    page_add_pair(page, "error frames", "%.0f", report_key_number(run, "error_frames"));
+    page_add_pair(page, "SYNCs late by more than half a period", "%.0f", key_number(run, "syncs_late"));
+    page_add_pair(page, "frames not sent", "%.0f", key_number(run, "frames_unsent"));
+    page_add_pair(page, "frames lost on arrival", "%.0f", key_number(run, "frames_lost"));
+    page_add_pair(page, "error frames", "%.0f", key_number(run, "error_frames"));
     page_end_pairs(page);
     add_histograms(page, run);
 }

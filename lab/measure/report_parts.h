@@ -13,9 +13,6 @@ struct report_words {
 
 const struct report_words *report_words_of(bool linear);
 
-/// A run's key as a number; NaN if it is not there.
-double report_key_number(const struct run *run, const char *key);
-
 /// A note about the worst SYNC, if the run has one; `rate_hz` of the SYNC.
 void report_add_bus_note(struct page *page, const struct run *run);
 

@@ -49,7 +49,7 @@ static struct figure_series *add_series(struct figure_panel *self, enum figure_k
     struct figure_series series = {.kind = kind, .count = y != NULL ? count : 0, .x = x, .y = y};
     text_copy(name, sizeof series.name, series.name);
     series.colour = cycle[coloured % (sizeof cycle / sizeof cycle[0])];
-    series.marker = (enum figure_marker)(plot_count_kind(self, figure_points, figure_points) % 5);
+    series.marker = (enum figure_marker)(plot_count_kind(self, figure_points, figure_points) % (figure_diamond + 1));
     series.dash = (enum figure_dash)(plot_count_kind(self, figure_line, figure_step) % 4);
     struct figure_series *slot = &self->series[self->count];
     *slot = series;

@@ -45,7 +45,17 @@ enum figure_colour {
     figure_grey,
 };
 
-enum figure_marker { figure_circle, figure_triangle, figure_square, figure_cross, figure_diamond };
+/// The first five are given by themselves, in turn; eight shapes can be told apart without colour.
+enum figure_marker {
+    figure_circle,
+    figure_triangle,
+    figure_square,
+    figure_cross,
+    figure_diamond,
+    figure_plus,
+    figure_ring,
+    figure_triangle_down,
+};
 
 enum figure_dash { figure_solid, figure_dashed, figure_dotted, figure_dash_dot };
 

@@ -237,23 +237,9 @@ static double find_left(const struct layout *self)
     return fmax(layout_left_px, layout_edge_px + widest + layout_label_gap_px);
 }
 
-static bool is_repeated(const struct figure *figure, size_t p, const struct figure_series *series)
-{
-    for (size_t before = 0; before < p; before++) {
-        for (size_t s = 0; s < figure->panel[before].count; s++) {
-            const struct figure_series *other = &figure->panel[before].series[s];
-            if (other->kind == series->kind && other->colour == series->colour && other->marker == series->marker &&
-                other->dash == series->dash && strcmp(other->name, series->name) == 0) {
-                return true;
-            }
-        }
-    }
-    return false;
-}
-
 /* What the legend adds to the name, so that the reader knows what the picture does not show. */
 static bool write_remark(const struct layout *self, size_t p, const struct figure_series *series,
-                         struct layout_item *item)
+                         char out_text[2 * figure_text_max])
 {
     const struct figure_panel *panel = &self->figure->panel[p];
     struct plot_area area = {&self->x, &self->y[p], 1000.0, 1000.0, 0};
@@ -262,7 +248,7 @@ static bool write_remark(const struct layout *self, size_t p, const struct figur
         bool shown = axis_can_show(panel->scale, series->value) && series->value >= self->y[p].low &&
                      series->value <= self->y[p].high;
         if (!shown) {
-            snprintf(item->text, sizeof item->text, "%s (%.4g, off the scale)", name, series->value);
+            snprintf(out_text, (size_t)(2 * figure_text_max), "%s (%.4g, off the scale)", name, series->value);
         }
         return !shown;
     }
@@ -272,11 +258,28 @@ static bool write_remark(const struct layout *self, size_t p, const struct figur
     }
     size_t outside = plot_count_outside(series, &area);
     if (!drawn) {
-        snprintf(item->text, sizeof item->text, "%s (no data)", name);
+        snprintf(out_text, (size_t)(2 * figure_text_max), "%s (no data)", name);
     } else if (outside > 0) {
-        snprintf(item->text, sizeof item->text, "%s (%zu off the scale)", name, outside);
+        snprintf(out_text, (size_t)(2 * figure_text_max), "%s (%zu off the scale)", name, outside);
     }
     return !drawn || outside > 0;
+}
+
+static bool is_repeated(const struct layout *self, size_t p, const struct figure_series *series)
+{
+    const struct figure *figure = self->figure;
+    char remark[2 * figure_text_max];
+    for (size_t before = 0; before < p; before++) {
+        for (size_t s = 0; s < figure->panel[before].count; s++) {
+            const struct figure_series *other = &figure->panel[before].series[s];
+            if (other->kind == series->kind && other->colour == series->colour && other->marker == series->marker &&
+                other->dash == series->dash && strcmp(other->name, series->name) == 0 &&
+                !write_remark(self, before, other, remark)) {
+                return true;
+            }
+        }
+    }
+    return false;
 }
 
 static void collect_items(struct layout *self, size_t p)
@@ -285,8 +288,8 @@ static void collect_items(struct layout *self, size_t p)
     for (size_t s = 0; s < panel->count; s++) {
         const struct figure_series *series = &panel->series[s];
         struct layout_item *item = &self->item[self->items];
-        bool remark = series->name[0] != '\0' && write_remark(self, p, series, item);
-        if (series->name[0] == '\0' || (!remark && is_repeated(self->figure, p, series))) {
+        bool remark = series->name[0] != '\0' && write_remark(self, p, series, item->text);
+        if (series->name[0] == '\0' || (!remark && is_repeated(self, p, series))) {
             continue;
         }
         if (!remark) {

@@ -55,7 +55,11 @@ static const char style[] =
     "h2,h3{break-after:avoid}figure,tr,li,dl{break-inside:avoid}p{orphans:3;widows:3}figure{overflow:visible}"
     "thead{display:table-header-group}footer{margin-top:8mm;break-before:avoid}.row{flex-wrap:nowrap}}\n";
 
-static void write_formatted(FILE *out, const char *format, va_list arguments)
+#if defined(__GNUC__)
+__attribute__((format(printf, 2, 0)))
+#endif
+static void
+write_formatted(FILE *out, const char *format, va_list arguments)
 {
     va_list again;
     va_copy(again, arguments);

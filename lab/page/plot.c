@@ -363,15 +363,28 @@ static void write_marker(FILE *out, const struct figure_series *series, double x
         fprintf(out, "m0 %.1fl%.1f %.1fl%.1f %.1fl%.1f %.1fz", -1.4 * r, 1.4 * r, 1.4 * r, -1.4 * r, 1.4 * r, -1.4 * r,
                 -1.4 * r);
         break;
+    case figure_plus:
+        fprintf(out, "m0 %.1fv%.1fm%.1f %.1fh%.1f", -1.3 * r, 2.6 * r, -1.3 * r, -1.3 * r, 2.6 * r);
+        break;
+    case figure_ring:
+        fprintf(out, "m%.1f 0a%.1f %.1f 0 1 0 %.1f 0a%.1f %.1f 0 1 0 %.1f 0", -1.1 * r, 1.1 * r, 1.1 * r, 2.2 * r,
+                1.1 * r, 1.1 * r, -2.2 * r);
+        break;
+    case figure_triangle_down:
+        fprintf(out, "m%.1f %.1fh%.1fl%.1f %.1fz", -1.3 * r, -0.9 * r, 2.6 * r, -1.3 * r, 2.2 * r);
+        break;
     }
 }
 
 static void open_markers(FILE *out, const struct figure_series *series, double r)
 {
-    static const char *const class_names[] = {"pt mc", "pt mf", "pt mf", "pt mx", "pt mf"};
-    double width = series->marker == figure_circle  ? 2.0 * r
-                   : series->marker == figure_cross ? fmax(1.0, 0.55 * r)
-                                                    : 0.0;
+    static const char *const class_names[] = {
+        [figure_circle] = "pt mc", [figure_triangle] = "pt mf",      [figure_square] = "pt mf",
+        [figure_cross] = "pt mx",  [figure_diamond] = "pt mf",       [figure_plus] = "pt mx",
+        [figure_ring] = "pt mx",   [figure_triangle_down] = "pt mf",
+    };
+    const bool stroked = strcmp(class_names[series->marker], "pt mx") == 0;
+    double width = series->marker == figure_circle ? 2.0 * r : stroked ? fmax(1.0, 0.55 * r) : 0.0;
     open_path(out, series, class_names[series->marker]);
     fprintf(out, " stroke-width=\"%.1f\" d=\"", width);
 }

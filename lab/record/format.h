@@ -64,7 +64,7 @@ enum format_match {
     format_match_sure,  ///< its first bytes are this format's alone
 };
 
-enum { format_head_size = 512, format_endings_max = 4 };
+enum { format_head_size = 16384, format_endings_max = 4 };
 
 struct record_format {
     const char *name;                        ///< of --to

@@ -2,6 +2,7 @@
 /// servoscope's own text files: runs and responses (docs/files.md). The row of names tells which of the two a file is.
 #include "lab/record/format.h"
 #include "lab/record/record_table.h"
+#include "lab/record/run_names.h"
 
 #include <stdbool.h>
 #include <stdlib.h>
@@ -44,6 +45,15 @@ static void read_names(const char *path, char out_names[names_size])
         gzclose_r(file);
 }
 
+/* A column that a run does not know is no loss, but one to know of. */
+static void note_unnamed(const struct run *run, struct format_notes *io_notes)
+{
+    for (size_t c = 0; c < run->column_count; c++)
+        if (run_name_axis(run->columns[c].name) == run_axis_unknown)
+            format_notes_add(io_notes, format_kept, "%s under its own name: what it is can be said with --map",
+                             run->columns[c].name);
+}
+
 /* Whether the columns that make a response are all there; those that it has no place for are noted. */
 static bool is_response(char *names, struct format_notes *io_notes)
 {
@@ -70,8 +80,12 @@ static int read_csv(const char *path, const struct format_options *options, stru
     *out_record = (struct record){.kind = record_run};
     read_names(path, names);
     strcpy(copy, names);
-    if (!is_response(copy, NULL))
-        return run_read(path, &options->run, &out_record->run, out_error);
+    if (!is_response(copy, NULL)) {
+        int status = run_read(path, &options->run, &out_record->run, out_error);
+        if (!status && !options->run.map)
+            note_unnamed(&out_record->run, io_notes);
+        return status;
+    }
     out_record->kind = record_frf;
     int status = frf_read(path, &out_record->frf, out_error);
     if (!status)

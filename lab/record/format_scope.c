@@ -29,14 +29,11 @@ struct scope {
 
 static enum format_match recognise(const unsigned char *head, size_t length)
 {
-    char text[format_head_size + 1];
-    memcpy(text, head, length);
-    text[length] = '\0';
-    const char *at = strncmp(text, "\xEF\xBB\xBF", 3) == 0 ? text + 3 : text;
-    return strlen(text) == length && strncmp(at, "Name", 4) == 0 && strstr(at, "\nFile") &&
-                   strstr(at, "Starttime of export")
-               ? format_match_sure
-               : format_match_none;
+    char *text = foreign_text_head(head, length);
+    const bool own = text && strncmp(text, "Name", 4) == 0 && (strstr(text, "\nFile") || strstr(text, "\rFile")) &&
+                     strstr(text, "Starttime of export");
+    free(text);
+    return own ? format_match_sure : format_match_none;
 }
 
 static int refuse(const struct scope *self, size_t line, const char *what, struct error *out_error)
@@ -51,26 +48,21 @@ static bool begins_with(const struct scope *self, size_t line, const char *word)
     return strncmp(text, word, length) == 0 && (text[length] == self->separator || text[length] == '\0');
 }
 
-static bool is_blank(const char *line)
-{
-    return line[strspn(line, " \t;,\r")] == '\0';
-}
-
 /// The head of the file has a "Name" too; the channels' is the one behind the first blank line.
 static int find_rows(struct scope *self, struct error *out_error)
 {
     size_t line = 0;
-    while (line < self->text.count && !is_blank(self->text.lines[line]))
+    while (line < self->text.count && !foreign_line_is_blank(self->text.lines[line]))
         line++;
     while (line < self->text.count && !begins_with(self, line, "Name"))
         line++;
     self->names = line;
-    while (line < self->text.count && !is_blank(self->text.lines[line]))
+    while (line < self->text.count && !foreign_line_is_blank(self->text.lines[line]))
         line++;
-    while (line < self->text.count && is_blank(self->text.lines[line]))
+    while (line < self->text.count && foreign_line_is_blank(self->text.lines[line]))
         line++;
     self->first = line;
-    while (line < self->text.count && !is_blank(self->text.lines[line]) && !begins_with(self, line, "EOF"))
+    while (line < self->text.count && !foreign_line_is_blank(self->text.lines[line]) && !begins_with(self, line, "EOF"))
         line++;
     self->end = line;
     return self->first < self->end
@@ -119,7 +111,7 @@ static void take_channels(struct scope *self, const struct foreign_cells *names,
         read_unit(cell_or_empty(units, at), unit);
         foreign_name(names->items[at], unit, channel->name, sizeof channel->name);
         snprintf(step, sizeof step, "%s", cell_or_empty(steps, at));
-        if (!foreign_number(step, self->decimal, &channel->step_ms))
+        if (!foreign_is_number(foreign_number(step, self->decimal, &channel->step_ms)))
             channel->step_ms = 0;
     }
 }
@@ -189,8 +181,7 @@ static int read_values(struct scope *self, size_t width, double *out_values, str
         int status = foreign_cells_split(self->text.lines[line], self->separator, &cells, out_error);
         for (size_t at = 0; at < width && !status; at++) {
             row[at] = NAN;
-            if (at < cells.count && cells.items[at][0] != '\0' &&
-                !foreign_number(cells.items[at], self->decimal, &row[at]))
+            if (at < cells.count && foreign_number(cells.items[at], self->decimal, &row[at]) == foreign_value_text)
                 status = error_set(out_error, error_refused, "%s:%zu: cell %zu: '%s' is not a number", self->text.path,
                                    line + 1, at + 1, cells.items[at]);
         }
@@ -206,6 +197,7 @@ struct run_of_values {
     size_t first, count;
 };
 
+/// Cells may be empty between the first value and the last: those are gaps, for foreign_take_run to mark.
 static struct run_of_values find_values(const struct scope *self, const struct channel *channel, const double *values,
                                         size_t width, double start_ms, double step_ms, size_t stride)
 {
@@ -215,9 +207,9 @@ static struct run_of_values find_values(const struct scope *self, const struct c
         found.first++;
     if (found.first == rows || values[found.first * width + channel->time] > start_ms + 0.01 * step_ms)
         return found;
-    for (size_t row = found.first; row < rows; row += stride, found.count++)
-        if (isnan(values[row * width + channel->time]) || isnan(values[row * width + channel->cell]))
-            break;
+    for (size_t row = found.first, at = 1; row < rows; row += stride, at++)
+        if (!isnan(values[row * width + channel->time]) && !isnan(values[row * width + channel->cell]))
+            found.count = at;
     return found;
 }
 
@@ -264,7 +256,7 @@ static int add_time(const struct scope *self, struct text_table *table, const do
     return status;
 }
 
-/// Channels begin and end a row apart; more is a hole in the shorter one, and what follows it is lost.
+/// Channels begin and end a row apart; more is the end of a shorter one, and what the others have behind it is lost.
 static void note_shortest(const struct scope *self, const struct run_of_values *at, size_t rows,
                           struct format_notes *io_notes)
 {
@@ -273,9 +265,21 @@ static void note_shortest(const struct scope *self, const struct run_of_values *
         longest = at[i].count > longest ? at[i].count : longest;
     for (size_t i = 0; at && i < self->count; i++)
         if (at[i].count == rows && longest > rows + 1) {
-            format_notes_add(io_notes, format_lost, "%s: has %zu values in a row, others %zu: only so many are kept",
+            format_notes_add(io_notes, format_lost,
+                             "%s: ends after %zu values, others after %zu: only so many are kept",
                              self->channels[i].name, rows, longest);
         }
+}
+
+/// The channel whose times and lines stand for all: one that has a value in each row of its own, else any.
+static size_t find_clock(const struct scope *self, const struct run_of_values *at, double step_ms)
+{
+    size_t clock = self->count;
+    for (size_t i = self->count; at && i-- > 0;)
+        if (at[i].count > 0 && (clock == self->count || stride_of(&self->channels[i], step_ms) == 1 ||
+                                stride_of(&self->channels[clock], step_ms) != 1))
+            clock = i;
+    return clock;
 }
 
 /// Channels that have values at the common times become columns, as long as the shortest of them.
@@ -294,19 +298,17 @@ static int make_table(struct scope *self, double step_ms, const double *values, 
         rows = at[i].count && at[i].count < rows ? at[i].count : rows;
     }
     note_shortest(self, at, rows, io_notes);
-    bool timed = false;
-    for (size_t i = 0; i < self->count && !status && rows < SIZE_MAX; i++) {
+    const size_t clock = find_clock(self, at, step_ms);
+    if (!status && clock < self->count)
+        status = add_time(self, table, values, width, self->channels[clock].time, at[clock],
+                          stride_of(&self->channels[clock], step_ms), rows, out_error);
+    for (size_t i = 0; i < self->count && !status && clock < self->count; i++) {
         const struct channel *channel = &self->channels[i];
-        const size_t stride = stride_of(channel, step_ms);
-        if (at[i].count == 0)
-            continue;
-        if (!timed)
-            status = add_time(self, table, values, width, channel->time, at[i], stride, rows, out_error);
-        timed = true;
-        if (!status)
-            status =
-                add_channel(table, channel->name, values, width, channel->cell, at[i], stride, rows, 1.0, out_error);
+        if (at[i].count > 0)
+            status = add_channel(table, channel->name, values, width, channel->cell, at[i], stride_of(channel, step_ms),
+                                 rows, 1.0, out_error);
     }
+    const bool timed = clock < self->count;
     free(at);
     return status || timed ? status : refuse(self, self->first, "no channel has values at that sample time", out_error);
 }

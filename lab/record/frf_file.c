@@ -2,6 +2,7 @@
 #include "lab/record/frf_file.h"
 
 #include "lab/record/atomic_file.h"
+#include "lab/record/line_reader.h"
 #include "lab/record/number.h"
 #include "lab/record/record_table.h"
 #include "lab/record/text_table.h"
@@ -273,6 +274,25 @@ int frf_take_table(struct text_table *io_table, struct frf *out_frf, struct erro
     if (status)
         frf_free(out_frf);
     return status;
+}
+
+bool frf_file_is(const char *path)
+{
+    struct error ignored;
+    struct line line = {0};
+    struct line_reader *reader = line_reader_open(path, &ignored);
+    const char *first = column_names[column_frequency];
+    const size_t length = strlen(first);
+    bool found = reader != NULL;
+    while (found && line_reader_next(reader, &line, &ignored) == line_ok) {
+        if (line.length > 0 && line.text[0] != '#')
+            break;
+        line.length = 0;
+    }
+    found = found && line.length > length && strncmp(line.text, first, length) == 0 && line.text[length] == ',';
+    if (reader)
+        line_reader_close(reader);
+    return found;
 }
 
 int frf_read(const char *path, struct frf *out_frf, struct error *out_error)

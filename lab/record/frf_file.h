@@ -57,6 +57,10 @@ void frf_free(struct frf *self);
 /// Replaces one of the four texts, e.g. frf_set_text(&frf.method, "mean"). Returns false if memory is short.
 bool frf_set_text(char **text, const char *value);
 
+/// Tells whether a file is a response rather than a run, by the beginning of its row of names; false if it cannot be
+/// read.
+bool frf_file_is(const char *path);
+
 /// Reads a response, plain or gzipped.
 /// Errors: error_refused with file, line, column, value and expectation; *out_frf is empty then.
 /// Test:   tests/unit/test_frf_file.c

@@ -13,38 +13,6 @@
 static const double exact_powers[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
                                       1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 
-/* 5^0 .. 5^27 are exact in 64 bits. */
-static const uint64_t powers_of_five[] = {
-    1,
-    5,
-    25,
-    125,
-    625,
-    3125,
-    15625,
-    78125,
-    390625,
-    1953125,
-    9765625,
-    48828125,
-    244140625,
-    1220703125,
-    6103515625,
-    30517578125,
-    152587890625,
-    762939453125,
-    3814697265625,
-    19073486328125,
-    95367431640625,
-    476837158203125,
-    2384185791015625,
-    11920928955078125,
-    59604644775390625,
-    298023223876953125,
-    1490116119384765625,
-    7450580596923828125,
-};
-
 enum {
     exact_power_max = 22,
     five_power_max = 27,
@@ -162,6 +130,38 @@ static const char *scan_decimal(const char *at, const char *end, struct decimal 
 
 #ifdef __SIZEOF_INT128__
 __extension__ typedef unsigned __int128 uint128;
+
+/* 5^0 .. 5^27 are exact in 64 bits. */
+static const uint64_t powers_of_five[] = {
+    1,
+    5,
+    25,
+    125,
+    625,
+    3125,
+    15625,
+    78125,
+    390625,
+    1953125,
+    9765625,
+    48828125,
+    244140625,
+    1220703125,
+    6103515625,
+    30517578125,
+    152587890625,
+    762939453125,
+    3814697265625,
+    19073486328125,
+    95367431640625,
+    476837158203125,
+    2384185791015625,
+    11920928955078125,
+    59604644775390625,
+    298023223876953125,
+    1490116119384765625,
+    7450580596923828125,
+};
 
 /* digits 5^power or digits / 5^-power as 62 to 64 bits times a power of two. What those bits leave out is never zero
  * and never half a last place of the 53 that a double has: it sets the lowest bit, so that rounding them to a double

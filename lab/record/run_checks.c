@@ -236,8 +236,13 @@ static int check_sizes(const struct text_table *table, size_t column, size_t fir
     const double *data = table->columns[column].data;
     for (size_t n = first_row; n < table->rows; n++)
         if (!(data[n] >= -value_max && data[n] <= value_max))
-            return error_set(out_error, error_refused, "%s:%zu: %s: %g is no measured value: at most %g was expected",
-                             table->path, table->row_line[n], table->columns[column].name, data[n], value_max);
+            return isnan(data[n])
+                       ? error_set(out_error, error_refused,
+                                   "%s:%zu: %s: there is no value: a number was expected in each row", table->path,
+                                   table->row_line[n], table->columns[column].name)
+                       : error_set(out_error, error_refused,
+                                   "%s:%zu: %s: %g is no measured value: at most %g was expected", table->path,
+                                   table->row_line[n], table->columns[column].name, data[n], value_max);
     return error_none;
 }
 
@@ -282,9 +287,16 @@ static int check_order(const struct run_checks *self, const struct text_table *t
     const double *time_s = table->columns[self->time_column].data;
     double before = self->rows > 0 ? self->last_s : NAN;
     for (size_t n = first_row; n < table->rows; n++) {
-        if (!isfinite(time_s[n]) || (self->rows + n > first_row && !(time_s[n] > before)))
-            return error_set(out_error, error_refused, "%s:%zu: %s: %.9g follows %.9g: time has to increase",
-                             table->path, table->row_line[n], name, time_s[n], before);
+        if (!isfinite(time_s[n]))
+            return error_set(out_error, error_refused,
+                             "%s:%zu: %s: there is no time: a number was expected in each row", table->path,
+                             table->row_line[n], name);
+        if (self->rows + n > first_row && !(time_s[n] > before))
+            return error_set(
+                out_error, error_refused,
+                "%s:%zu: %s: %.9g follows %.9g: time has to increase (--rate HZ trusts the rate and leaves the "
+                "time stamps unjudged)",
+                table->path, table->row_line[n], name, time_s[n], before);
         before = time_s[n];
     }
     return error_none;
@@ -300,9 +312,9 @@ static int check_steps(const struct run_checks *self, const struct text_table *t
         double steps = (time_s[n] - before) / self->step_s;
         if (!(steps <= gap_steps))
             return error_set(out_error, error_refused,
-                             "%s:%zu: %s: %.9g follows %.9g: %.0f samples are missing, a step of %.6g s was expected",
+                             "%s:%zu: %s: %.9g follows %.9g: %.0f sample%s missing, a step of %.6g s was expected",
                              table->path, table->row_line[n], name, time_s[n], before, fmax(1.0, round(steps) - 1.0),
-                             self->step_s);
+                             steps < 2.5 ? " is" : "s are", self->step_s);
         if (!(fabs(steps - 1.0) <= step_tolerance))
             return error_set(
                 out_error, error_refused,

@@ -45,26 +45,40 @@ static const struct {
 } units[] = {
     {{"rad", "per", "s"}, quantity_angular_velocity, 1.0},
     {{"deg", "per", "s"}, quantity_angular_velocity, 0.017453292519943295},
+    {{"mrad", "per", "s"}, quantity_angular_velocity, 1e-3},
+    {{"rev", "per", "s"}, quantity_angular_velocity, 6.283185307179586},
+    {{"um", "per", "s"}, quantity_velocity, 1e-6},
     {{"mm", "per", "s"}, quantity_velocity, 1e-3},
     {{"m", "per", "s"}, quantity_velocity, 1.0},
     {{"rad", "s"}, quantity_angular_velocity, 1.0},
     {{"deg", "s"}, quantity_angular_velocity, 0.017453292519943295},
+    {{"mrad", "s"}, quantity_angular_velocity, 1e-3},
+    {{"rev", "s"}, quantity_angular_velocity, 6.283185307179586},
+    {{"um", "s"}, quantity_velocity, 1e-6},
     {{"mm", "s"}, quantity_velocity, 1e-3},
+    {{"mm", "min"}, quantity_velocity, 1e-3 / 60.0},
+    {{"m", "min"}, quantity_velocity, 1.0 / 60.0},
     {{"m", "s"}, quantity_velocity, 1.0},
     {{"rpm"}, quantity_angular_velocity, 0.10471975511965977},
     {{"mNm"}, quantity_torque, 1e-3},
+    {{"Ncm"}, quantity_torque, 1e-2},
+    {{"kNm"}, quantity_torque, 1e3},
     {{"Nm"}, quantity_torque, 1.0},
     {{"kN"}, quantity_force, 1e3},
     {{"N"}, quantity_force, 1.0},
+    {{"uA"}, quantity_current, 1e-6},
     {{"mA"}, quantity_current, 1e-3},
     {{"A"}, quantity_current, 1.0},
+    {{"kV"}, quantity_voltage, 1e3},
     {{"mV"}, quantity_voltage, 1e-3},
     {{"V"}, quantity_voltage, 1.0},
+    {{"rev"}, quantity_angle, 6.283185307179586},
     {{"mrad"}, quantity_angle, 1e-3},
     {{"rad"}, quantity_angle, 1.0},
     {{"deg"}, quantity_angle, 0.017453292519943295},
     {{"um"}, quantity_length, 1e-6},
     {{"mm"}, quantity_length, 1e-3},
+    {{"cm"}, quantity_length, 1e-2},
     {{"m"}, quantity_length, 1.0},
 };
 
@@ -172,11 +186,55 @@ static void find_unit(struct column *io)
     }
 }
 
+/// The words of a unit that stand between `at` and `end`, with a name in front as find_unit wants it.
+static void bracket_words(const char *at, const char *end, struct column *out)
+{
+    char text[words_max * word_size] = "x ";
+    const size_t length = (size_t)(end - at);
+    *out = (struct column){.rank = -1};
+    if (length + 3 < sizeof text)
+        strncat(text, at, length);
+    split_words(text, out);
+}
+
+/// A unit in brackets is all that is in them, "[rad/s]", whatever their words are alone: of "[N/m]" the metre is no
+/// position. Square brackets hold nothing but units; "(filtered)" may be a remark. False if there are no such brackets.
+static bool find_bracket_unit(const char *name, struct column *io)
+{
+    bool found = false;
+    for (const char *open = strpbrk(name, "[("); open; open = strpbrk(open + 1, "[(")) {
+        const char *close = strpbrk(open, "])");
+        struct column inside;
+        if (!close)
+            break;
+        bracket_words(open + 1, close, &inside);
+        for (size_t u = 0; u < sizeof units / sizeof units[0] && !io->known; u++) {
+            size_t count = 0;
+            while (count < 3 && units[u].words[count])
+                count++;
+            io->known = inside.count == count + 1 && ends_with_unit(&inside, inside.count, units[u].words);
+            io->quantity = units[u].quantity;
+            io->scale = units[u].scale;
+        }
+        if (io->known)
+            return true;
+        found = found || *open == '[' || strcspn(open + 1, "/^*%") < (size_t)(close - open - 1);
+    }
+    return found;
+}
+
+/// Sets known, quantity and scale by the unit in a name.
+static void take_unit(const char *name, struct column *io)
+{
+    if (!find_bracket_unit(name, io))
+        find_unit(io);
+}
+
 static void read_column(const char *name, struct column *out)
 {
     *out = (struct column){.rank = -1};
     split_words(name, out);
-    find_unit(out);
+    take_unit(name, out);
     if (!out->known || HAS_WORD(out, foreign_words))
         return;
     out->set_point = HAS_WORD(out, set_point_words);
@@ -188,10 +246,26 @@ bool run_guess_scale(const char *name, double *out_scale)
 {
     struct column column = {.rank = -1};
     split_words(name, &column);
-    find_unit(&column);
+    take_unit(name, &column);
     if (column.known)
         *out_scale = column.scale;
     return column.known;
+}
+
+bool run_guess_time_scale(const char *name, double *out_scale)
+{
+    static const struct {
+        const char *unit;
+        double scale;
+    } times[] = {{"s", 1.0}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}, {"min", 60.0}, {"h", 3600.0}};
+    struct column column = {.rank = -1};
+    split_words(name, &column);
+    for (size_t i = 0; column.count > 1 && i < sizeof times / sizeof times[0]; i++)
+        if (strcmp(column.words[column.count - 1], times[i].unit) == 0) {
+            *out_scale = times[i].scale;
+            return true;
+        }
+    return false;
 }
 
 static void write_name(enum quantity quantity, bool set_point, bool load, char *out_name, size_t size)

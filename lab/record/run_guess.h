@@ -27,8 +27,12 @@ int run_guess_map(const struct text_table *table, const char *const *keep, size_
                   struct error *out_error);
 
 /// The factor that brings a column's values to SI by the unit at the end of its name ("pos [mm]": 0.001); false, and
-/// *out_scale as it was, if it names none that is known.
+/// *out_scale as it was, if it names none that is known. What stands in brackets is the unit as a whole: "[N/m]" and
+/// "[A rms]" are none that is known.
 bool run_guess_scale(const char *name, double *out_scale);
+
+/// The same for a column of times, "Zeit [ms]", "time_us".
+bool run_guess_time_scale(const char *name, double *out_scale);
 
 /// Adds the key `columns_named` with the map as text, if it names anything.
 /// Errors: error_refused if memory is short

@@ -171,25 +171,12 @@ static int no_such_column(const struct text_table *table, const char *name, stru
                      table->names_line, name, list, used < sizeof list ? "" : " ...");
 }
 
-/* Milliseconds and microseconds, which are no quantity of the motion. */
-static bool time_scale(const char *source, double *out_scale)
-{
-    const size_t length = strlen(source);
-    const char *end = source + length;
-    const size_t bracket = length > 0 && (end[-1] == ']' || end[-1] == ')');
-    const char *unit = end - bracket - 2;
-    if (length < 4 + bracket || unit[1] != 's' || (unit[0] != 'm' && unit[0] != 'u') || !strchr("_ [(", unit[-1]))
-        return false;
-    *out_scale = unit[0] == 'm' ? 1e-3 : 1e-6;
-    return true;
-}
-
 /* A name that ends in another unit than SI's asks for a factor: degrees are not taken for radians in silence. */
 static int check_unit(const struct run_map_entry *entry, const struct text_table *table, struct error *out_error)
 {
     double scale = 1.0;
-    const bool known =
-        strcmp(entry->name, "time_s") == 0 ? time_scale(entry->source, &scale) : run_guess_scale(entry->source, &scale);
+    const bool known = strcmp(entry->name, "time_s") == 0 ? run_guess_time_scale(entry->source, &scale)
+                                                          : run_guess_scale(entry->source, &scale);
     if (entry->scaled || !known || scale == 1.0)
         return error_none;
     return error_set(out_error, error_refused,

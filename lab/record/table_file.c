@@ -5,6 +5,7 @@
 #include "core/crc32.h"
 #include "core/fixed.h"
 #include "lab/record/atomic_file.h"
+#include "lab/record/c_name.h"
 #include "lab/record/number.h"
 #include "lab/record/text_table.h"
 
@@ -607,30 +608,6 @@ int table_file_write_csv(const char *path, struct table *self, struct error *out
     return stream ? atomic_file_commit(&file, out_error) : error_refused;
 }
 
-enum { identifier_size = 64 };
-
-static bool is_letter(char c)
-{
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-}
-
-/* A C name from a path: its last part up to the first dot, in lower case; `upper` for macros. */
-static void make_identifier(const char *path, bool upper, char out_name[identifier_size])
-{
-    const char *slash = strrchr(path, '/');
-    const char *base = slash ? slash + 1 : path;
-    size_t length = 0;
-    if (!is_letter(base[0]))
-        length = (size_t)snprintf(out_name, identifier_size, "%s", upper ? "TABLE_" : "table_");
-    for (; *base && *base != '.' && length + 1 < identifier_size; base++) {
-        char c = is_letter(*base) || (*base >= '0' && *base <= '9') ? *base : '_';
-        if (is_letter(c))
-            c = (char)(upper ? c & ~0x20 : c | 0x20);
-        out_name[length++] = c;
-    }
-    out_name[length] = '\0';
-}
-
 static void write_array(FILE *stream, const char *name, const char *macro, const uint8_t *bytes, size_t size)
 {
     fprintf(stream, "static const uint8_t %s_mst[%s_BYTES] = {", name, macro);
@@ -642,9 +619,9 @@ static void write_array(FILE *stream, const char *name, const char *macro, const
 static void write_header_text(FILE *stream, const char *path, const struct table *self, const uint8_t *bytes,
                               size_t size)
 {
-    char name[identifier_size], macro[identifier_size];
-    make_identifier(path, false, name);
-    make_identifier(path, true, macro);
+    char name[c_name_size], macro[c_name_size];
+    c_name_from_path(path, false, name);
+    c_name_from_path(path, true, macro);
     fprintf(stream,
             "/* Multisine table made by servoscope, the bytes of an .mst file. Before playing it:\n"
             " *     msgen_table_open(%s_mst, sizeof %s_mst, &table) == core_ok */\n"

@@ -88,9 +88,15 @@ static char *copy_cell(const struct cell *cell)
     return copy;
 }
 
+/// Line of the last row or key that was read, for messages.
+static size_t line_number(const struct text_stream *self)
+{
+    return line_reader_number(self->lines);
+}
+
 static int short_of_memory(const struct text_stream *self, struct error *out_error)
 {
-    return error_set(out_error, error_refused, "%s:%zu: memory is short", self->table.path, text_stream_line(self));
+    return error_set(out_error, error_refused, "%s:%zu: memory is short", self->table.path, line_number(self));
 }
 
 /* `# key: value`; a comment without a colon is kept under the empty key. */
@@ -215,7 +221,7 @@ static int read_cell(const struct text_stream *self, size_t column, const struct
     if (kind == text_cell_free || (kind == text_cell_number_or_empty && status == number_empty))
         return error_none;
     int shown = cell->length < shown_max ? (int)cell->length : shown_max;
-    return error_set(out_error, error_refused, "%s:%zu: %s: '%.*s' %s", self->table.path, text_stream_line(self),
+    return error_set(out_error, error_refused, "%s:%zu: %s: '%.*s' %s", self->table.path, line_number(self),
                      self->cell_names[column], shown, cell->text, number_status_str(status));
 }
 
@@ -266,12 +272,12 @@ static int read_header(struct text_stream *self, text_table_judge judge, void *c
         enum line_status read = line_reader_next(self->lines, &line, out_error);
         if (read == line_failed)
             return error_refused;
-        if (read == line_end && text_stream_line(self) == 0)
+        if (read == line_end && line_number(self) == 0)
             return error_set(out_error, error_refused, "%s: the file is empty: a row of column names was expected",
                              self->table.path);
         if (read == line_end)
             return error_set(out_error, error_refused, "%s:%zu: the file ends without a row of column names",
-                             self->table.path, text_stream_line(self) + 1);
+                             self->table.path, line_number(self) + 1);
         int status = error_none;
         if (line.length > 0 && line.text[0] == '#')
             status = read_key(self, &line, out_error);
@@ -332,7 +338,7 @@ int text_stream_fill(struct text_stream *self, size_t rows, struct error *out_er
     }
     if (self->ended && self->row_total == 0)
         return error_set(out_error, error_refused, "%s:%zu: the file ends without a row of numbers", self->table.path,
-                         text_stream_line(self) + 1);
+                         line_number(self) + 1);
     return error_none;
 }
 
@@ -347,11 +353,6 @@ double *text_stream_give_column(struct text_stream *self, size_t column)
     self->table.columns[column].data = NULL;
     self->capacity = 0;
     return data;
-}
-
-size_t text_stream_line(const struct text_stream *self)
-{
-    return line_reader_number(self->lines);
 }
 
 void text_stream_close(struct text_stream *self)

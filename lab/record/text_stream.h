@@ -41,9 +41,6 @@ void text_stream_forget_rows(struct text_stream *self);
 /// The values of a column, which belong to the caller from here on; forget the rows once all wanted ones are given.
 double *text_stream_give_column(struct text_stream *self, size_t column);
 
-/// Line of the last row or key that was read, for messages.
-size_t text_stream_line(const struct text_stream *self);
-
 void text_stream_close(struct text_stream *self);
 
 #endif

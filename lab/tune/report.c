@@ -3,7 +3,6 @@
 
 #include "lab/estimate/report.h"
 #include "lab/page/layout.h"
-#include "lab/tune/gap.h"
 #include "lab/tune/say.h"
 
 #include <complex.h>
@@ -21,14 +20,17 @@ static double decibel(double magnitude)
     return 20.0 * log10(magnitude); // minus infinity for 0: a gap in the figure
 }
 
-/// Every curve of the page, on the plant's lines; nothing is drawn across a gap, in which a point is put that is none.
+enum { grid_points = 400, curve_arrays = 13, grid_arrays = 3 };
+
+/// Every figure's numbers: of the measured lines, which nothing joins, and of the reference on a grid of its own.
 struct curves {
     size_t count;
     double *memory;
     double *frequency_hz;
     double *open_db, *open_low_db, *open_high_db, *open_deg, *open_deg_low, *open_deg_high;
-    double *sensitivity_db, *closed_db, *closed_deg, *reference_db, *reference_deg;
+    double *sensitivity_db, *closed_db, *closed_deg, *over_two_std;
     double *real, *imag;
+    double *grid_hz, *reference_db, *reference_deg; ///< grid_points values each
 };
 
 /// Follows the phase along frequency; the first value lies in -270 .. 90 degrees.
@@ -37,21 +39,19 @@ static void unwrap(size_t count, double *phase_deg)
     double centre = -90.0;
     for (size_t k = 0; k < count; k++) {
         phase_deg[k] -= 360.0 * round((phase_deg[k] - centre) / 360.0);
-        centre = isnan(phase_deg[k]) ? centre : phase_deg[k];
+        centre = phase_deg[k];
     }
 }
 
-static bool is_gap(const struct tune_plant *plant, size_t line)
+/// T = L/(1+L) of a loop L whose relative standard deviation is s has |T| s / |1+L|.
+static void set_point(const struct tune_result *result, size_t k, struct curves *out)
 {
-    const double *f = plant->frequency_hz;
-    return line + 1 < plant->count && f[line + 1] > GAP_RATIO_MOST * f[line] && f[line] >= gap_lower_end_hz(plant);
-}
-
-static void set_point(const struct tune_result *result, size_t line, size_t k, struct curves *out)
-{
-    const double complex loop = result->loop[line], closed = loop / (1.0 + loop);
-    const double share = 2.0 * result->plant.std[line] / cabs(result->plant.response[line]);
-    out->frequency_hz[k] = result->plant.frequency_hz[line];
+    const double complex loop = result->loop[k], closed = loop / (1.0 + loop);
+    const double relative = result->plant.std[k] / cabs(result->plant.response[k]);
+    const double closed_std = cabs(closed) * relative / cabs(1.0 + loop);
+    const bool known = result->plant.std_known && closed_std > 0.0;
+    const double share = 2.0 * relative;
+    out->frequency_hz[k] = result->plant.frequency_hz[k];
     out->open_db[k] = decibel(cabs(loop));
     out->open_low_db[k] = decibel(cabs(loop) * fmax(1.0 - share, 0.0));
     out->open_high_db[k] = decibel(cabs(loop) * (1.0 + share));
@@ -60,49 +60,53 @@ static void set_point(const struct tune_result *result, size_t line, size_t k, s
     out->sensitivity_db[k] = decibel(1.0 / cabs(1.0 + loop));
     out->closed_db[k] = decibel(cabs(closed));
     out->closed_deg[k] = degrees_per_rad * carg(closed);
-    out->reference_db[k] = decibel(cabs(result->reference[line]));
-    out->reference_deg[k] = degrees_per_rad * carg(result->reference[line]);
+    out->over_two_std[k] = known ? cabs(closed - result->reference[k]) / (2.0 * closed_std) : NAN;
     out->real[k] = creal(loop);
     out->imag[k] = cimag(loop);
 }
 
+static void set_reference(const struct tune_result *result, struct curves *out)
+{
+    const double first = out->frequency_hz[0], last = out->frequency_hz[out->count - 1];
+    for (size_t i = 0; i < grid_points; i++) {
+        out->grid_hz[i] = first * pow(last / first, (double)i / (grid_points - 1));
+        const double complex reference = tune_reference_at(&result->solution.reference, out->grid_hz[i]);
+        out->reference_db[i] = decibel(cabs(reference));
+        out->reference_deg[i] = degrees_per_rad * carg(reference);
+    }
+    unwrap(grid_points, out->reference_deg);
+}
+
 static bool make_curves(const struct tune_result *result, struct curves *out)
 {
-    enum { arrays = 14 };
-    const struct tune_plant *plant = &result->plant;
-    out->count = plant->count;
-    for (size_t line = 0; line < plant->count; line++) {
-        out->count += is_gap(plant, line);
-    }
-    out->memory = malloc(arrays * out->count * sizeof *out->memory);
+    out->count = result->plant.count;
+    out->memory = malloc((curve_arrays * out->count + (size_t)grid_arrays * grid_points) * sizeof *out->memory);
     if (!out->memory) {
         return false;
     }
-    double **const all[arrays] = {
-        &out->open_db,       &out->open_low_db,    &out->open_high_db, &out->open_deg,     &out->open_deg_low,
-        &out->open_deg_high, &out->sensitivity_db, &out->closed_db,    &out->closed_deg,   &out->reference_db,
-        &out->reference_deg, &out->real,           &out->imag,         &out->frequency_hz,
+    double **const of_lines[] = {
+        &out->open_db,       &out->open_low_db,    &out->open_high_db, &out->open_deg,   &out->open_deg_low,
+        &out->open_deg_high, &out->sensitivity_db, &out->closed_db,    &out->closed_deg, &out->over_two_std,
+        &out->real,          &out->imag,           &out->frequency_hz,
     };
-    for (size_t i = 0; i < arrays; i++) {
-        *all[i] = out->memory + i * out->count;
+    double **const of_grid[grid_arrays] = {&out->grid_hz, &out->reference_db, &out->reference_deg};
+    double *rest = out->memory;
+    for (size_t i = 0; i < sizeof of_lines / sizeof of_lines[0]; i++, rest += out->count) {
+        *of_lines[i] = rest;
     }
-    size_t k = 0;
-    for (size_t line = 0; line < plant->count; line++) {
-        set_point(result, line, k++, out);
-        if (is_gap(plant, line)) {
-            for (size_t i = 0; i < arrays; i++) {
-                (*all[i])[k] = NAN;
-            }
-            out->frequency_hz[k++] = sqrt(plant->frequency_hz[line] * plant->frequency_hz[line + 1]);
-        }
+    for (size_t i = 0; i < grid_arrays; i++, rest += grid_points) {
+        *of_grid[i] = rest;
+    }
+    for (size_t k = 0; k < out->count; k++) {
+        set_point(result, k, out);
     }
     unwrap(out->count, out->open_deg);
     unwrap(out->count, out->closed_deg);
-    unwrap(out->count, out->reference_deg);
-    for (k = 0; k < out->count; k++) {
+    for (size_t k = 0; k < out->count; k++) {
         out->open_deg_low[k] = out->open_deg[k] - out->open_deg_high[k];
         out->open_deg_high[k] = out->open_deg[k] + out->open_deg_high[k];
     }
+    set_reference(result, out);
     return true;
 }
 
@@ -187,9 +191,9 @@ static void add_margins(struct page *page, const struct tune_result *result)
     }
 }
 
-static void add_warnings(struct page *page, const struct tune_result *result, size_t first, size_t end)
+static void add_warnings(struct page *page, const struct tune_result *result)
 {
-    for (size_t i = first; i < end; i++) {
+    for (size_t i = 0; i < result->warning_count; i++) {
         const char *text = result->warnings[i];
         page_add_note(page, page_warning, "Mind", "%c%s.", toupper((unsigned char)text[0]), text + 1);
     }
@@ -200,9 +204,8 @@ static void add_verdict(struct page *page, const struct tune_result *result)
     char gains[say_size], performance[say_size];
     say_gains(&result->plant, &result->solution.controller, gains);
     say_performance(result, performance);
-    add_warnings(page, result, 0, result->file_warning_count);
     page_add_note(page, page_good, gains, "%s", performance);
-    add_warnings(page, result, result->file_warning_count, result->warning_count);
+    add_warnings(page, result);
 }
 
 static void add_stability(struct page *page, const struct tune_result *result)
@@ -221,6 +224,15 @@ static void add_stability(struct page *page, const struct tune_result *result)
 
 // ---- Figures
 
+/// Measured lines in a figure of several panels.
+static void add_lines(struct figure_panel *panel, const char *name, const struct curves *curves, const double *values,
+                      enum figure_colour colour)
+{
+    struct figure_series *points = figure_add_points(panel, name, curves->count, curves->frequency_hz, values);
+    points->colour = colour;
+    points->marker = colour == figure_blue ? figure_circle : figure_triangle;
+}
+
 static void add_open_loop(struct page *page, const struct tune_result *result, const struct curves *curves)
 {
     struct figure figure;
@@ -228,46 +240,53 @@ static void add_open_loop(struct page *page, const struct tune_result *result, c
     const double *f = curves->frequency_hz;
     figure_start(&figure, "frequency in Hz", axis_log);
     struct figure_panel *magnitude = figure_add_panel(&figure, "open loop K G in dB", axis_linear);
-    struct figure_panel *phase = figure_add_panel(&figure, "phase in degrees", axis_degrees);
+    struct figure_panel *phase = figure_add_panel(&figure, "phase of K G in degrees", axis_degrees);
     phase->height = 130;
     if (result->plant.std_known) {
-        figure_add_band(magnitude, "±2 std", count, f, curves->open_low_db, curves->open_high_db);
-        figure_add_band(phase, "", count, f, curves->open_deg_low, curves->open_deg_high);
+        figure_add_spans(magnitude, "±2 std", count, f, curves->open_low_db, curves->open_high_db)->colour =
+            figure_blue;
+        figure_add_spans(phase, "", count, f, curves->open_deg_low, curves->open_deg_high)->colour = figure_blue;
     }
-    figure_add_line(magnitude, "K G", count, f, curves->open_db)->colour = figure_blue;
-    figure_add_line(phase, "", count, f, curves->open_deg)->colour = figure_blue;
+    add_lines(magnitude, "K G, measured lines", curves, curves->open_db, figure_blue);
+    add_lines(phase, "", curves, curves->open_deg, figure_blue);
     figure_add_limit(magnitude, "0 dB", 0.0);
     figure_add_limit(phase, "-180 degrees", -180.0);
-    page_add_figure(page, &figure, "Open loop: controller times measured response.");
+    page_add_figure(page, &figure,
+                    "Open loop: controller times measured response. Its phase has every delay in it, that of the hold "
+                    "too: they all count for stability.");
 }
 
-static void add_closed_loop(struct page *page, const struct curves *curves)
+static void add_closed_loop(struct page *page, const struct tune_result *result, const struct curves *curves)
 {
     struct figure figure;
-    const size_t count = curves->count;
-    const double *f = curves->frequency_hz;
     figure_start(&figure, "frequency in Hz", axis_log);
     struct figure_panel *closed = figure_add_panel(&figure, "T = KG/(1+KG) in dB", axis_linear);
     struct figure_panel *phase = figure_add_panel(&figure, "phase of T in degrees", axis_degrees);
+    struct figure_panel *residual = figure_add_panel(&figure, "residual over 2 std: T less reference", axis_log);
     struct figure_panel *sensitivity = figure_add_panel(&figure, "S = 1/(1+KG) in dB", axis_linear);
     struct figure_series *reference[2];
     closed->low = -40.0;
     phase->height = 110;
+    residual->height = 110;
     sensitivity->low = -40.0;
-    figure_add_line(closed, "T", count, f, curves->closed_db)->colour = figure_blue;
-    reference[0] = figure_add_line(closed, "reference M", count, f, curves->reference_db);
-    figure_add_limit(closed, "-3 dB", -10.0 * log10(2.0));
-    figure_add_line(phase, "", count, f, curves->closed_deg)->colour = figure_blue;
-    reference[1] = figure_add_line(phase, "", count, f, curves->reference_deg);
+    reference[0] = figure_add_line(closed, "reference M", grid_points, curves->grid_hz, curves->reference_db);
+    reference[1] = figure_add_line(phase, "", grid_points, curves->grid_hz, curves->reference_deg);
     for (size_t i = 0; i < 2; i++) {
         reference[i]->colour = figure_vermilion;
         reference[i]->dash = figure_dashed;
     }
-    figure_add_line(sensitivity, "S", count, f, curves->sensitivity_db)->colour = figure_green;
+    add_lines(closed, "T, measured lines", curves, curves->closed_db, figure_blue);
+    add_lines(phase, "", curves, curves->closed_deg, figure_blue);
+    figure_add_limit(closed, "-3 dB", -10.0 * log10(2.0));
+    add_lines(residual, result->plant.std_known ? "T" : "T: the file has no std", curves, curves->over_two_std,
+              figure_blue);
+    figure_add_limit(residual, "1: within 2 std", 1.0);
+    add_lines(sensitivity, "S, measured lines", curves, curves->sensitivity_db, figure_green);
     figure_add_limit(sensitivity, "6 dB", decibel(2.0));
     page_add_figure(page, &figure,
                     "Complementary sensitivity T (command to response) beside the reference M, and sensitivity S "
-                    "(what is left of a disturbance).");
+                    "(what is left of a disturbance). A residual above 1 is no noise: the controller has too few gains "
+                    "to give the reference there.");
 }
 
 enum { circle_points = 181 };
@@ -307,12 +326,10 @@ static void add_nyquist(struct page *page, const struct tune_result *result, con
     circle = figure_add_line(panel, "modulus margin: no nearer to -1", circle_points, modulus[0], modulus[1]);
     circle->colour = figure_vermilion;
     circle->dash = figure_dashed;
-    struct figure_series *curve = figure_add_line(panel, "K G", curves->count, curves->real, curves->imag);
-    curve->colour = figure_blue;
-    curve->dash = figure_solid;
-    struct figure_series *lines = figure_add_points(panel, "", curves->count, curves->real, curves->imag);
+    struct figure_series *lines =
+        figure_add_points(panel, "K G, measured lines", curves->count, curves->real, curves->imag);
     lines->colour = figure_blue;
-    lines->size = 3;
+    lines->size = 4;
     struct figure_series *point = figure_add_points(panel, "-1", 1, &minus_one, &zero);
     point->colour = figure_vermilion;
     point->marker = figure_cross;
@@ -330,21 +347,24 @@ static void add_nyquist(struct page *page, const struct tune_result *result, con
 void tune_report_sections(struct page *page, const struct frf *frf, const struct tune_result *result)
 {
     struct curves curves;
+    const bool drawn = make_curves(result, &curves);
     add_verdict(page, result);
-    page_add_section(page, "Controller");
-    add_setup(page, result);
+    page_add_section(page, "Closed loop");
+    if (drawn) {
+        add_closed_loop(page, result, &curves);
+    } else {
+        page_add_paragraph(page, "Memory was short for the figures.");
+    }
     page_add_section(page, "Margins");
     add_margins(page, result);
+    page_add_section(page, "Controller");
+    add_setup(page, result);
+    page_add_section(page, "Why it is stable");
     add_stability(page, result);
-    if (make_curves(result, &curves)) {
-        page_add_section(page, "Closed loop");
-        add_closed_loop(page, &curves);
-        page_add_section(page, "Open loop");
+    if (drawn) {
         add_open_loop(page, result, &curves);
         add_nyquist(page, result, &curves);
         free(curves.memory);
-    } else {
-        page_add_paragraph(page, "Memory was short for the figures.");
     }
     frf_report_section(page, frf, NULL);
 }

@@ -29,18 +29,6 @@ void tearDown(void)
     bench_end();
 }
 
-/// Waits, with a sign of life, until the drive is neither settling nor running nor stopping.
-static void follow(void)
-{
-    for (int i = 0; i < 1000; i++) {
-        TEST_ASSERT_EQUAL_INT(modbus_host_ok, modbus_host_read_state(&host, &state));
-        if (state.state == modbus_state_done || state.state == modbus_state_fault)
-            return;
-        bench_wait(NULL, 20);
-    }
-    TEST_FAIL_MESSAGE("the run does not end");
-}
-
 static double complex number(const float pair[2])
 {
     return (double)pair[0] + I * (double)pair[1];
@@ -69,7 +57,7 @@ static void test_modbus_drive_measures_the_streamed_response(void)
     const struct modbus_host_setup setup = bench_setup(settle, periods);
     struct frf streamed;
     bench_start(&host, &setup);
-    follow();
+    bench_follow(&host, &state);
     TEST_ASSERT_EQUAL_INT(modbus_end_complete, state.end);
     TEST_ASSERT_EQUAL_UINT32(periods, state.periods_valid);
     TEST_ASSERT_EQUAL_INT(modbus_host_ok, modbus_host_read_spectrum(&host, MODBUS_MEAN, bench_lines, mean, &spectrum));
@@ -96,7 +84,7 @@ static void test_modbus_drive_means_are_those_of_its_periods(void)
     double complex input[bench_lines] = {0}, output[bench_lines] = {0}, cross[bench_lines] = {0};
     static struct modbus_record single[periods][bench_lines];
     bench_start(&host, &setup);
-    follow();
+    bench_follow(&host, &state);
     TEST_ASSERT_EQUAL_INT(modbus_host_ok, modbus_host_read_spectrum(&host, MODBUS_MEAN, bench_lines, mean, &spectrum));
     for (uint32_t p = 0; p < periods; p++) {
         TEST_ASSERT_EQUAL_INT(modbus_host_ok, modbus_host_read_spectrum(&host, p, bench_lines, single[p], &spectrum));
@@ -128,7 +116,7 @@ static void test_modbus_drive_keeps_the_last_periods(void)
     bench_start(&host, &setup);
     TEST_ASSERT_EQUAL_INT(modbus_host_ok, modbus_host_read_spectrum(&host, 0, bench_lines, records, &spectrum));
     TEST_ASSERT_EQUAL_UINT32(modbus_spectrum_not_yet, spectrum.validity);
-    follow();
+    bench_follow(&host, &state);
     TEST_ASSERT_EQUAL_INT(modbus_host_ok, modbus_host_read_spectrum(&host, 4, bench_lines, records, &spectrum));
     TEST_ASSERT_EQUAL_UINT32(modbus_spectrum_not_kept, spectrum.validity);
     TEST_ASSERT_EQUAL_INT(modbus_host_ok, modbus_host_read_spectrum(&host, 5, bench_lines, records, &spectrum));

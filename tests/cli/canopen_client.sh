@@ -15,4 +15,4 @@ if ! cmp "$sheet" "$folder/now.eds"; then
     echo "FAILED: the sheet in the repository is not what the dictionary says; renew it with: $pipe eds >sim/node/servoscope-drive.eds" >&2
     exit 1
 fi
-timeout 300 "$venv/bin/python" "$SERVOSCOPE_SOURCE/tests/cli/canopen_client.py" "$pipe" "$sheet"
+timeout 300 "$venv/bin/python" "$SERVOSCOPE_SOURCE/tests/foreign/canopen_client.py" "$pipe" "$sheet"

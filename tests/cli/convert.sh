@@ -72,6 +72,10 @@ assert said["input"] == "torque_Nm" and said["lines"] > 20 and said["lost"] and 
 ' || fail "--json: $(cat said)"
 "$SERVOSCOPE" convert run.uff58b /dev/stdout --to csv | cmp - run.csv || fail "to standard output"
 
+# --out, as elsewhere.
+"$SERVOSCOPE" convert run.csv --out b.csv --quiet && cmp run.csv b.csv || fail "convert IN --out OUT"
+refuse 2 "OUT is given twice: 'x.csv' and --out 'b.csv'" run.csv x.csv --out b.csv
+
 # A recording of others, in text.
 awk -F, 'BEGIN {print "t,I_q,pos"} !/^#/ && !/^t/ {print $1 "," $3 * 2 "," $4}' run.csv >foreign.csv
 "$SERVOSCOPE" convert foreign.csv mapped.csv --map time_s=t,torque_Nm=I_q*0.5,position_rad=pos >said

@@ -55,10 +55,18 @@ refuse 1 "there" scope.csv x.csv --map torque_Nm=nothing
 sed '20s/;[^;]*$/;abc/' scope.csv >bad.csv
 refuse 1 "bad.csv:20: cell 8: 'abc' is not a number" bad.csv x.csv
 sed '21,24d' scope.csv >bad.csv
-refuse 1 "bad.csv:22: time_s: 0.007 follows 0.004: 2 samples are missing" bad.csv x.csv
+refuse 1 "bad.csv:21: time_s: 0.013 follows 0.008: 4 samples are missing" bad.csv x.csv
 awk -F';' -v OFS=';' 'NR == 500 { $5 = "" } 1' scope.csv >hole.csv
 "$SERVOSCOPE" convert hole.csv mapped.csv >said || fail "hole.csv: status $?"
-grep -q 'lost: angle \[deg\]: has 488 values in a row, others 1500: only so many are kept' said || fail "$(cat said)"
+grep -q 'run, 1500 samples' said || fail "hole.csv: $(cat said)"
+grep -q 'kept: 1 row with an empty cell, the first in line 500 (angle \[deg\]): marked as lost with valid 0' said || fail "$(cat said)"
+grep -v '^#' mapped.csv | awk -F, 'NR == 1 { for (c = 1; c <= NF; c++) valid = $c == "valid" ? c : valid }
+    NR > 1 && $valid != 1 { print NR - 2; lost++ } END { exit lost != 1 }' >lost || fail "hole.csv: lost rows $(cat lost)"
+[ "$(cat lost)" = 488 ] || fail "hole.csv: row $(cat lost) is lost"
+# A channel that ends early ends the others, and that is said.
+awk -F';' -v OFS=';' 'NR >= 1000 && NR < 1512 { $5 = "" } 1' scope.csv >short.csv
+"$SERVOSCOPE" convert short.csv mapped.csv >said || fail "short.csv: status $?"
+grep -q 'lost: angle \[deg\]: ends after 988 values, others after 1500: only so many are kept' said || fail "$(cat said)"
 sed '11,$d' scope.csv >bad.csv
 refuse 1 "expected a row of names that begins with 'Name', a blank line, values" bad.csv x.csv
 
@@ -94,7 +102,7 @@ gzip -k table.txt
 sed '50s/;1,25;/;/' table.csv >bad.csv
 refuse 1 "bad.csv:50: 3 cells, expected 4" bad.csv x.csv
 sed '50s/1,25/1,2,5/' table.csv >bad.csv
-refuse 1 "bad.csv:50: cell 3: '1.2,5' is not a number" bad.csv x.csv
+refuse 1 "bad.csv:50: cell 3: '1,2,5' is not a number" bad.csv x.csv
 printf 'a;b\nc;d\n' >bad.csv
 refuse 1 "no row of numbers was found" bad.csv x.csv
 refuse 2 "expected csv, gnuplot" table.csv x.csv --to twincat
@@ -102,10 +110,15 @@ refuse 2 "expected csv, gnuplot" table.csv x.csv --to twincat
 # What reads recordings itself says where to go.
 "$SERVOSCOPE" frf table.txt --out x.csv 2>err && fail "frf reads tabs"
 grep -q "'servoscope convert' makes such a file of it" err || fail "$(cat err)"
-# A unit in a mapped column's name is asked for, not passed over; a factor, 1 too, answers.
+# A unit in a mapped column's name is honoured here, and said; what reads the recording itself asks for it. A factor, 1 too, answers.
 printf 'Time_ms,Iq_A,Angle_deg\n0,1,2\n1,2,3\n2,3,4\n' >deg.csv
-refuse 1 "deg.csv:1: --map: position_rad=Angle_deg: the column's name says another unit; expected position_rad=Angle_deg*0.0174532925" \
-    deg.csv x.csv --rate 1000 --map position_rad=Angle_deg
-refuse 1 "time_s=Time_ms*0.001" deg.csv x.csv --map time_s=Time_ms
+"$SERVOSCOPE" convert deg.csv good.csv --map time_s=Time_ms,position_rad=Angle_deg >said || fail "deg.csv: status $?"
+grep -q 'assumed: time_s: Time_ms, its unit by the file, times 0.001' said || fail "$(cat said)"
+grep -q 'assumed: position_rad: Angle_deg, its unit by the file, times 0.0174533' said || fail "$(cat said)"
 "$SERVOSCOPE" convert deg.csv good.csv --map time_s=Time_ms*0.001,position_rad=Angle_deg*1 --quiet || fail "a factor of 1"
+[ "$(tail -1 good.csv)" = 0.002,3,4 ] || fail "a factor of 1: $(tail -1 good.csv)"
+subcommand=frf
+refuse 1 "deg.csv:1: --map: position_rad=Angle_deg: the column's name says another unit; expected position_rad=Angle_deg*0.0174532925" \
+    deg.csv --out x.csv --rate 1000 --map position_rad=Angle_deg
+refuse 1 "time_s=Time_ms*0.001" deg.csv --out x.csv --map time_s=Time_ms
 [ "$failures" -eq 0 ]

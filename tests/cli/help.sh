@@ -46,6 +46,36 @@ grep -rhoE '\{\.name = "[a-z0-9-]+", \.kind = option_' "$SERVOSCOPE_SOURCE/tools
 while read -r option; do
     grep -qx -- "--$option" offered || fail "no help names --$option"
 done <taken
+for name in "${names[@]}"; do
+    complete_words servoscope "$name" -- >offered
+    while read -r option; do
+        "$SERVOSCOPE" "$name" "--$option=" >/dev/null 2>err || true
+        grep -q "unknown option" err || grep -qx -- "--$option" offered || fail "$name takes --$option, and its help does not name it"
+    done <taken
+done
+
+# A word that is misspelt is answered with the one that was meant, if there is one.
+meant() { # meant PART WORD...
+    local part=$1 status=0
+    shift
+    "$SERVOSCOPE" "$@" >out 2>err || status=$?
+    [ "$status" -eq 2 ] || fail "status $status: $*"
+    grep -qF -- "$part" err || fail "no '$part' in '$(cat err)': $*"
+    [ ! -s out ] || fail "says something on standard output: $*"
+}
+meant "'diagnos' is not a subcommand: did you mean diagnose?" diagnos
+meant "did you mean simulate?" simualte
+meant "did you mean measure?" meas
+meant "'xyzzy' is not a subcommand; 'servoscope --help' lists them" xyzzy
+meant "did you mean frf?" manual ffr
+meant "unknown option '--methd': did you mean --method?" frf run.csv --methd mean
+meant "unknown option '--limit-vel=3'; see" design --limit-vel=3 # four options begin with that
+meant "did you mean --amplitude-tolerance?" design --amplitude-tolerence 1
+meant "unknown option '-out': did you mean --out?" frf run.csv -out x.csv
+meant "did you mean --quiet?" frf --quite
+meant "unknown option '--zzz'; see 'servoscope frf --help'" frf --zzz
+"$SERVOSCOPE" help frf >one && "$SERVOSCOPE" frf --help | cmp - one || fail "help frf"
+"$SERVOSCOPE" help | cmp - <("$SERVOSCOPE" --help) || fail "help"
 
 # Manual pages: requests are those of man(7), and each subcommand is on the program's page.
 "$SERVOSCOPE" manual >servoscope.1

@@ -128,6 +128,23 @@ fi
 "$SERVOSCOPE" measure --drive "modbus-tcp:$place" "${run[@]}" --out after.csv --quiet || fail "after a dead master"
 kill -INT "$drive"
 wait "$drive" || fail "drive: $(cat served-err)"
+
+# A drive that is gone in mid-run: what was read until then is kept, and says why it ended.
+serve tcp:127.0.0.1:0
+"$SERVOSCOPE" measure --drive "modbus-tcp:$place" --table table.mst --periods 1000 --out lost.csv >said 2>err &
+job=$!
+sleep 4
+kill -KILL "$drive"
+wait "$drive" 2>/dev/null || true
+status=0
+wait "$job" || status=$?
+[ "$status" -eq 1 ] || fail "a drive that is gone: status $status"
+grep -Eq 'the response of [0-9]+ periods until then is kept' err || fail "a drive that is gone: $(cat err)"
+grep -q '^# stopped_by: --drive: ' lost.csv || fail "a drive that is gone: no stopped_by in lost.csv"
+periods=$(sed -n 's/^# periods: //p' lost.csv)
+[ "${periods:-0}" -ge 2 ] && [ "$periods" -lt 1000 ] || fail "a drive that is gone: $periods periods"
+"$SERVOSCOPE" tune lost.csv --bandwidth 20 --quiet || fail "tune does not take the response that was kept"
+rm -f lost.csv
 refuse 1 "Connection refused" --drive "modbus-tcp:$place" "${run[@]}" --out x.csv
 
 # RTU, at the default slave number of the drive, and at one that nobody has.

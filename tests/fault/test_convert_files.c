@@ -130,6 +130,39 @@ static void test_convert_files_survive_any_damage_to_a_binary_universal_file(voi
     attack_bits(7);
 }
 
+/* Tables of other programs, with what makes them hard: quotes over line ends, times of day, marks between thousands,
+   empty cells, UTF-16. A cut may leave a whole, shorter table. */
+static const char *const foreign_texts[] = {
+    "Logger\n\n\"Zeit\n[s]\";\"Moment [Nm]\";Lage;State\n;;(\xC2\xB0);(-)\n0,000;1.234,5;-2,5;RUN\n0,001;;1,25;RUN\n"
+    "0,002;1.234;NaN;STOP\n0,003;0,5;3;RUN\n\nEnd;of it\n",
+    "Date/Time,M_Nm,phi_deg\n2026-02-28T23:59:59.998Z,1,\"2,000.5\"\n2026-02-28T23:59:59.999Z,2,3\n"
+    "2026-03-01T00:00:00.000Z,3,4\n2026-03-01T00:00:00.001Z,3,4\n",
+    "Name\tx\r\nFile\tx.csv\r\nStarttime of "
+    "export\t1\t2\r\n\r\nName\ta\tName\tb\r\nSampleTime[ms]\t1\tSampleTime[ms]\t1\r\n"
+    "Unit\tNm (M)\tUnit\t\xB0 (A)\r\n\r\n0\t1,5\t0\t2\r\n1\t2,5\t1\t\r\n2\t3,5\t2\t4\r\n3\t1\t3\t2\r\nEOF\r\n",
+};
+
+static void take_text(const char *text, bool utf16)
+{
+    free(bytes);
+    length = strlen(text) * (utf16 ? 2 : 1);
+    bytes = calloc(length + 1, 1);
+    for (size_t i = 0; bytes && i < strlen(text); i++)
+        bytes[utf16 ? 2 * i : i] = text[i];
+}
+
+static void test_convert_files_survive_any_damage_to_a_table_of_another_program(void)
+{
+    for (size_t i = 0; i < sizeof foreign_texts / sizeof foreign_texts[0]; i++)
+        for (int utf16 = 0; utf16 < 2; utf16++) {
+            take_text(foreign_texts[i], utf16);
+            TEST_ASSERT_EQUAL_INT(0, read_bytes(bytes, length, "whole", i));
+            for (size_t cut = 0; cut < length; cut++)
+                (void)read_bytes(bytes, cut, "cut after byte", cut);
+            attack_bits(utf16 ? 5 : 2);
+        }
+}
+
 static void ignore_without_matio(void)
 {
     if (!mat_built_in())
@@ -227,6 +260,7 @@ int main(void)
     RUN_TEST(test_convert_files_survive_any_damage_to_a_universal_run);
     RUN_TEST(test_convert_files_survive_any_damage_to_a_universal_response);
     RUN_TEST(test_convert_files_survive_any_damage_to_a_binary_universal_file);
+    RUN_TEST(test_convert_files_survive_any_damage_to_a_table_of_another_program);
     RUN_TEST(test_convert_files_survive_any_damage_to_a_matlab_run);
     RUN_TEST(test_convert_files_survive_any_damage_to_a_matlab_response);
     RUN_TEST(test_convert_files_refuse_a_matlab_file_of_version_73_that_is_cut_off);

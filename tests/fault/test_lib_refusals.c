@@ -23,7 +23,6 @@ static struct frf_twiddles_f32 f32;
 static union frf_word storage[FRF_STORAGE_WORDS(4u, 4u)];
 static struct frf_dft_config config;
 static int32_t coefficients[words_max], block_storage[words_max], part[words_max];
-static int16_t frames[128];
 static struct frf_block_table block_table;
 static struct frf_block_config block_config;
 static const struct frf_block_layout folded = {32, 32, 1};
@@ -36,8 +35,8 @@ void setUp(void)
     config = (struct frf_dft_config){bins, bin_count, 2, storage, FRF_STORAGE_WORDS(4u, 4u), 0, 0};
     TEST_ASSERT_EQUAL_INT(core_ok,
                           frf_block_build(coefficients, words_max, bins, bin_count, period, &folded, &block_table));
-    block_config = (struct frf_block_config){&block_table, 1,         1, false, block_storage, words_max, frames, 128,
-                                             part,         words_max, 0, 0};
+    block_config =
+        (struct frf_block_config){&block_table, 1, 1, false, block_storage, words_max, part, words_max, 0, 0};
 }
 
 void tearDown(void) {}
@@ -225,7 +224,15 @@ static void test_block_refuses_each_argument_by_itself(void)
     bad.channels = 0;
     expect_block(core_err_frf_channels, bad);
     bad = block_config;
-    bad.frames = NULL;
+    uint32_t words = FRF_BLOCK_STORAGE_WORDS(4u, 1u, 1u, 32u, 32u);
+    bad.storage_words = words;
+    expect_block(core_ok, bad);
+    bad.storage_words = words - 1u;
+    expect_block(core_err_storage, bad);
+    bad.spread = true;
+    bad.storage_words = words + FRF_BLOCK_SPREAD_WORDS(1u, 32u);
+    expect_block(core_ok, bad);
+    --bad.storage_words;
     expect_block(core_err_storage, bad);
     bad = block_config;
     bad.rail_low = -5;
@@ -242,9 +249,8 @@ static void test_block_folded_refuses_its_part_by_itself(void)
     static const uint32_t odd[] = {1, 3, 5};
     const struct frf_block_layout layout = {32, 32, 2};
     TEST_ASSERT_EQUAL_INT(core_ok, frf_block_build(coefficients, words_max, odd, 3, period, &layout, &block_table));
-    uint32_t words = FRF_BLOCK_PART_WORDS(1u, 96u, 2u, 32u);
+    uint32_t words = FRF_BLOCK_PART_WORDS(1u, 96u, 2u);
     struct frf_block_config bad = block_config;
-    bad.frames = NULL;
     bad.part_words = words;
     expect_block(core_ok, bad);
     bad.part_words = words - 1u;

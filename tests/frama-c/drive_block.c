@@ -8,7 +8,7 @@ enum { period = 16, block = 8, words_max = 64 };
 
 static const uint32_t bins[2] = {2, 6};
 static int32_t rows[words_max], restore[4], basis[words_max], storage[words_max], part[words_max];
-static int16_t frames[block], samples[2 * period];
+static int16_t samples[2 * period];
 
 /* Cuts, gaps and periods are numbers, so that Eva follows them one by one; samples and coefficients are any. What one
  * call leaves is joined before the next. */
@@ -16,7 +16,7 @@ static void run(const struct frf_block_table *table, bool spread)
 {
     struct frf_block dft;
     struct frf_block_period latched;
-    struct frf_block_config config = {table, 1, 1, spread, storage, words_max, frames, block, part, words_max, 0, 0};
+    struct frf_block_config config = {table, 1, 1, spread, storage, words_max, part, words_max, 0, 0};
     if (frf_block_init(&dft, &config) != core_ok) {
         return;
     }
@@ -39,7 +39,7 @@ static void run(const struct frf_block_table *table, bool spread)
 
 int main(void)
 {
-    struct frf_block_table table = {rows, restore, 0, bins, 2, period, period, false, {block, block, 1}, 8};
+    struct frf_block_table table = {rows, restore, 0, bins, 2, period, period, 0, false, {block, block, 1}, 8};
     for (uint32_t i = 0; i < words_max; ++i) {
         rows[i] = any_i32();
         basis[i] = any_i32();

@@ -11,6 +11,7 @@
 #include "lab/estimate/frf_mean.h"
 #include "lab/estimate/harmonics.h"
 #include "lab/estimate/repetition.h"
+#include "lab/numeric/cmplx.h"
 #include "tests/support/claim.h"
 
 #include <math.h>

@@ -3,6 +3,7 @@
 #include "lab/estimate/clocked.h"
 #include "lab/estimate/direction.h"
 #include "lab/estimate/frf_mean.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/record/run.h"
 #include "unity.h"
 

@@ -15,11 +15,11 @@
 enum { period_max = 4096, bins_max = 24, channels = 3, block_words = 65536 };
 
 static int16_t samples[2 * period_max * channels];
+static int32_t samples_i24[2 * period_max * channels];
 static uint32_t bins[bins_max];
 static union frf_word storage[FRF_STORAGE_WORDS(bins_max, channels)];
 static int32_t coefficients[FRF_BLOCK_TABLE_WORDS(bins_max, 128u, 64u)];
 static int32_t sums[block_words];
-static int16_t frames[FRF_BLOCK_FRAME_SAMPLES(channels, 128u)];
 static uint8_t table_bytes[65536];
 static uint32_t crc;
 
@@ -56,6 +56,7 @@ static void fill_samples(void)
         uint8_t bytes[2];
         core_put_u16(bytes, bits);
         samples[i] = core_get_i16(bytes);
+        samples_i24[i] = (int32_t)samples[i] * 256 + (samples[i] < 0 ? 0 : (int32_t)(state & 0xFFu));
     }
 }
 
@@ -67,11 +68,19 @@ static uint32_t spread_bins(uint32_t last, uint32_t step)
     return count;
 }
 
+static void add_frames(struct frf_dft *dft, uint32_t first, uint32_t count)
+{
+    if (dft->number == frf_number_q23)
+        frf_dft_add_i24(dft, samples_i24 + (size_t)first * channels, count);
+    else
+        frf_dft_add_i16(dft, samples + (size_t)first * channels, count);
+}
+
 static void run_dft(struct frf_dft *dft, const char *name, uint32_t period)
 {
     struct frf_period latched;
-    frf_dft_add_i16(dft, samples, period - 7u);
-    frf_dft_add_i16(dft, samples + (size_t)(period - 7u) * channels, period + 7u);
+    add_frames(dft, 0, period - 7u);
+    add_frames(dft, period - 7u, period + 7u);
     require(frf_dft_latest(dft, &latched) && latched.sequence == 2, name);
     for (uint32_t b = 0; b < dft->bin_count; b++) {
         for (uint32_t c = 0; c < channels; c++) {
@@ -87,19 +96,24 @@ static void run_dft(struct frf_dft *dft, const char *name, uint32_t period)
 static void exact_sums(uint32_t period)
 {
     static int16_t storage_q15[FRF_TWIDDLE_WORDS(period_max - 1u) + 1u];
+    static int32_t storage_q23[FRF_TWIDDLE_WORDS(period_max - 1u) + 1u];
     static int32_t storage_q31[FRF_TWIDDLE_WORDS(period_max - 1u) + 1u];
     uint32_t words = FRF_TWIDDLE_WORDS(period), count = spread_bins((period - 1u) / 2u, 1);
     struct frf_twiddles_q15 q15;
+    struct frf_twiddles_q23 q23;
     struct frf_twiddles_q31 q31;
     struct frf_dft dft;
     struct frf_dft_config config = {bins, count, channels, storage, FRF_STORAGE_WORDS(bins_max, channels), 0, 0};
     require(frf_twiddles_build_q15(storage_q15, words, period, &q15) == core_ok, "Q15 table");
+    require(frf_twiddles_build_q23(storage_q23, words, period, &q23) == core_ok, "Q23 table");
     require(frf_twiddles_build_q31(storage_q31, words, period, &q31) == core_ok, "Q31 table");
     for (uint32_t i = 0; i < words; i++)
-        take(storage_q31[i] ^ (int32_t)storage_q15[i]);
+        take(storage_q31[i] ^ (int32_t)storage_q15[i] ^ storage_q23[i] / 128);
     report("twiddles", period);
     require(frf_dft_init_q15(&dft, &config, &q15) == core_ok, "DFT Q15");
     run_dft(&dft, "sums-q15", period);
+    require(frf_dft_init_q23(&dft, &config, &q23) == core_ok, "DFT Q23");
+    run_dft(&dft, "sums-q23", period);
     require(frf_dft_init_q31(&dft, &config, &q31) == core_ok, "DFT Q31");
     run_dft(&dft, "sums-q31", period);
     struct frf_walk walk = {3, bins[count - 1u], period, channels};
@@ -108,9 +122,54 @@ static void exact_sums(uint32_t period)
     report("sum-by-twos", period);
 }
 
+static void quarter_sums(uint32_t period)
+{
+    static int16_t storage_q15[FRF_QUARTER_WORDS(period_max - 1u)];
+    static int32_t storage_q23[FRF_QUARTER_WORDS(period_max - 1u)], storage_q31[FRF_QUARTER_WORDS(period_max - 1u)];
+    uint32_t words = FRF_QUARTER_WORDS(period), count = spread_bins((period - 1u) / 2u, 1);
+    struct frf_quarter_q15 q15;
+    struct frf_quarter_q23 q23;
+    struct frf_quarter_q31 q31;
+    struct frf_dft dft;
+    struct frf_dft_config config = {bins, count, channels, storage, FRF_STORAGE_WORDS(bins_max, channels), 0, 0};
+    require(frf_quarter_build_q15(storage_q15, words, period, &q15) == core_ok, "Q15 quarter");
+    require(frf_quarter_build_q23(storage_q23, words, period, &q23) == core_ok, "Q23 quarter");
+    require(frf_quarter_build_q31(storage_q31, words, period, &q31) == core_ok, "Q31 quarter");
+    require(frf_dft_init_quarter_q15(&dft, &config, &q15) == core_ok, "DFT Q15");
+    run_dft(&dft, "quarter-sums-q15", period);
+    require(frf_dft_init_quarter_q23(&dft, &config, &q23) == core_ok, "DFT Q23");
+    run_dft(&dft, "quarter-sums-q23", period);
+    require(frf_dft_init_quarter_q31(&dft, &config, &q31) == core_ok, "DFT Q31");
+    run_dft(&dft, "quarter-sums-q31", period);
+}
+
+static void two_level_sums(uint32_t period)
+{
+    static struct frf_point coarse[3][128];
+    static struct frf_turn fine[2][128];
+    static struct frf_turn_q15 fine_q15[128];
+    uint32_t points = FRF_COARSE_POINTS(period), turns = FRF_FINE_TURNS(period);
+    uint32_t count = spread_bins((period - 1u) / 2u, 1);
+    struct frf_two_level_q15 q15;
+    struct frf_two_level_q23 q23;
+    struct frf_two_level_q31 q31;
+    struct frf_dft dft;
+    struct frf_dft_config config = {bins, count, channels, storage, FRF_STORAGE_WORDS(bins_max, channels), 0, 0};
+    require(points <= 128 && turns <= 128, "room for two levels");
+    require(frf_two_level_build_q15(coarse[0], points, fine_q15, turns, period, &q15) == core_ok, "Q15 levels");
+    require(frf_two_level_build_q23(coarse[1], points, fine[0], turns, period, &q23) == core_ok, "Q23 levels");
+    require(frf_two_level_build_q31(coarse[2], points, fine[1], turns, period, &q31) == core_ok, "Q31 levels");
+    require(frf_dft_init_two_level_q15(&dft, &config, &q15) == core_ok, "DFT Q15");
+    run_dft(&dft, "two-level-sums-q15", period);
+    require(frf_dft_init_two_level_q23(&dft, &config, &q23) == core_ok, "DFT Q23");
+    run_dft(&dft, "two-level-sums-q23", period);
+    require(frf_dft_init_two_level_q31(&dft, &config, &q31) == core_ok, "DFT Q31");
+    run_dft(&dft, "two-level-sums-q31", period);
+}
+
 static void block_sums(const struct frf_block_layout *layout, uint32_t period, uint32_t last, bool spread)
 {
-    static int32_t part[FRF_BLOCK_PART_WORDS(channels, period_max, 2u, 128u)];
+    static int32_t part[FRF_BLOCK_PART_WORDS(channels, period_max, 2u)];
     uint32_t count = spread_bins(last, layout->repeats > 1 ? layout->repeats : 1);
     struct frf_block_table table;
     struct frf_block dft;
@@ -121,11 +180,7 @@ static void block_sums(const struct frf_block_layout *layout, uint32_t period, u
     for (uint32_t w = 0; w < FRF_BLOCK_TABLE_WORDS(count, layout->block_samples, layout->terms); w++)
         take(coefficients[w]);
     report("block-table", layout->block_samples * 1000u + layout->terms);
-    struct frf_block_config config = {&table, channels,
-                                      2,      spread,
-                                      sums,   block_words,
-                                      frames, sizeof frames / sizeof *frames,
-                                      part,   sizeof part / sizeof *part,
+    struct frf_block_config config = {&table, channels, 2, spread, sums, block_words, part, sizeof part / sizeof *part,
                                       0,      0};
     require(frf_block_init(&dft, &config) == core_ok, "block DFT");
     frf_block_add_i16(&dft, samples, period + layout->block_samples);
@@ -219,8 +274,11 @@ int main(void)
     static const uint32_t periods[] = {97, 500, 1009, 2000, 4093, 4096};
     static const struct frf_block_layout folded = {32, 32, 1}, shared = {128, 16, 1}, part = {32, 32, 2};
     fill_samples();
-    for (unsigned p = 0; p < sizeof periods / sizeof periods[0]; p++)
+    for (unsigned p = 0; p < sizeof periods / sizeof periods[0]; p++) {
         exact_sums(periods[p]);
+        quarter_sums(periods[p]);
+        two_level_sums(periods[p]);
+    }
     block_sums(&folded, 2000, 900, false);
     block_sums(&folded, 1009, 500, true);
     block_sums(&shared, 4096, 80, false);

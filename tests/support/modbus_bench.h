@@ -196,6 +196,18 @@ static inline const char *bench_name(const void *self)
 static const struct modbus_link bench_link = {NULL,         bench_read, bench_write, bench_exchange,
                                               bench_settle, bench_wait, bench_name};
 
+/// Waits, with a sign of life, until the drive is neither settling nor running nor stopping.
+static inline void bench_follow(struct modbus_host *host, struct modbus_host_state *out_state)
+{
+    for (int i = 0; i < 1000; i++) {
+        TEST_ASSERT_EQUAL_INT(modbus_host_ok, modbus_host_read_state(host, out_state));
+        if (out_state->state == modbus_state_done || out_state->state == modbus_state_fault)
+            return;
+        bench_wait(NULL, 20);
+    }
+    TEST_FAIL_MESSAGE("the run does not end");
+}
+
 /// Up to START, through the host's side.
 static inline void bench_start(struct modbus_host *host, const struct modbus_host_setup *setup)
 {

@@ -157,6 +157,7 @@ static inline void sample_unexplained(struct diagnosis *out)
     out->tie_count = 0;
     out->extended = (struct diagnosis_figures){0.112, 2.13, 5.72};
     out->unexplained_share = 0.31;
+    out->rest_shape = -1;
     snprintf(out->where, sizeof out->where, "0.8..3 Hz, moving left, after 9 s");
 }
 

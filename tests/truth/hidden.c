@@ -31,7 +31,7 @@ static double now_s(void)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-enum hidden_class hidden_class_of(const struct truth_wish *wish)
+static enum hidden_class class_of(const struct truth_wish *wish)
 {
     return wish->causes == 0                         ? hidden_clean
            : wish->causes > 1                        ? hidden_combination
@@ -101,7 +101,8 @@ static void mix(struct truth_wish *self, enum hidden_class class, int number)
     }
 }
 
-struct truth_wish hidden_wish(const struct hidden_options *options, int index)
+/// What case number `index` of a campaign hides.
+static struct truth_wish wish_of(const struct hidden_options *options, int index)
 {
     struct truth_wish wish = {.protocol = options->protocol};
     if (options->kinds) {
@@ -121,7 +122,7 @@ struct truth_wish hidden_wish(const struct hidden_options *options, int index)
     return wish;
 }
 
-void hidden_case_path(char *out, const struct hidden_options *options, const struct truth_wish *wish, const char *name)
+static void case_path(char *out, const struct hidden_options *options, const struct truth_wish *wish, const char *name)
 {
     char kinds[SCORE_TEXT_LENGTH];
     truth_wish_name(wish, kinds, sizeof kinds);
@@ -140,11 +141,11 @@ static int run_diagnosis(const struct hidden_options *options, const struct trut
 {
     char fit[HIDDEN_PATH_LENGTH], validation[HIDDEN_PATH_LENGTH], model[HIDDEN_PATH_LENGTH];
     char answer[HIDDEN_PATH_LENGTH], log[HIDDEN_PATH_LENGTH];
-    hidden_case_path(fit, options, wish, "run1.csv");
-    hidden_case_path(validation, options, wish, "run2.csv");
-    hidden_case_path(model, options, wish, "nominal.json");
-    hidden_case_path(answer, options, wish, "d.json");
-    hidden_case_path(log, options, wish, "log.txt");
+    case_path(fit, options, wish, "run1.csv");
+    case_path(validation, options, wish, "run2.csv");
+    case_path(model, options, wish, "nominal.json");
+    case_path(answer, options, wish, "d.json");
+    case_path(log, options, wish, "log.txt");
     pid_t child = fork();
     if (child == 0) {
         int out = open(log, O_WRONLY | O_CREAT | O_TRUNC, 0666);
@@ -171,10 +172,10 @@ static void remove_case(const struct hidden_options *options, const struct truth
     static const char *const names[] = {"run1.csv", "run2.csv", "nominal.json", "truth.json", "d.json", "log.txt"};
     char path[HIDDEN_PATH_LENGTH];
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
-        hidden_case_path(path, options, wish, names[i]);
+        case_path(path, options, wish, names[i]);
         unlink(path);
     }
-    hidden_case_path(path, options, wish, "");
+    case_path(path, options, wish, "");
     rmdir(path);
 }
 
@@ -188,8 +189,8 @@ static void run_case(const struct hidden_options *options, struct hidden_record 
     for (int i = 1; i < record->wish.causes; i++) {
         record->evidence_nats = fmin(record->evidence_nats, truth->evidence_nats[i]);
     }
-    hidden_case_path(directory, options, &record->wish, "");
-    hidden_case_path(answer, options, &record->wish, "d.json");
+    case_path(directory, options, &record->wish, "");
+    case_path(answer, options, &record->wish, "d.json");
     unlink(answer);
     if (truth_case_write(truth, directory)) {
         score_fail(&record->score, "case not written");
@@ -274,8 +275,8 @@ static int run_campaign(const struct hidden_options *options, struct hidden_reco
     pthread_t thread[64];
     int started = 0;
     for (int i = 0; i < options->cases; i++) {
-        records[i] = (struct hidden_record){.wish = hidden_wish(options, i)};
-        records[i].class = hidden_class_of(&records[i].wish);
+        records[i] = (struct hidden_record){.wish = wish_of(options, i)};
+        records[i].class = class_of(&records[i].wish);
     }
     printf("seed %llu, %d cases\n", (unsigned long long)options->seed, options->cases);
     while (started < options->jobs && pthread_create(&thread[started], NULL, work, &campaign) == 0) {

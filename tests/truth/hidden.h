@@ -51,11 +51,6 @@ struct hidden_record {
     struct score score;
 };
 
-/// What case number `index` of a campaign hides.
-struct truth_wish hidden_wish(const struct hidden_options *options, int index);
-enum hidden_class hidden_class_of(const struct truth_wish *wish);
-void hidden_case_path(char *out, const struct hidden_options *options, const struct truth_wish *wish, const char *name);
-
 const char *hidden_rate_name(enum hidden_rate rate);
 /// Required of 400 fresh cases.
 double hidden_rate_bound(enum hidden_rate rate);

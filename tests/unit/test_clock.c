@@ -3,6 +3,7 @@
 
 #include "lab/estimate/frf_mean.h"
 #include "lab/estimate/method.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include "unity.h"

@@ -49,7 +49,7 @@ static uint64_t products[design_product_count][bins_max + 1];
 static void note(enum design_product kind, int64_t bin)
 {
     int64_t folded = bin < 0 ? -bin : bin;
-    if (folded > 0 && folded <= bins_max && excited[folded]) {
+    if (folded > 0 && folded <= bins_max) {
         products[kind][folded]++;
     }
 }
@@ -88,6 +88,25 @@ static void count_one_by_one(void)
             }
         }
     }
+}
+
+/// Every multiple of the spacing between the lowest and the highest line, excited or free.
+static void assert_map_as_one_by_one(const char *message)
+{
+    struct design_product_map map;
+    TEST_ASSERT_TRUE(design_intermodulation_map(line_count, bins, &map));
+    TEST_ASSERT_EQUAL_size_t_MESSAGE((bins[line_count - 1] - bins[0]) / counts.spacing_bins + 1, map.count, message);
+    for (size_t i = 0; i < map.count; i++) {
+        uint64_t orders[2] = {0, 0};
+        TEST_ASSERT_EQUAL_UINT32(bins[0] + i * counts.spacing_bins, map.bins[i]);
+        TEST_ASSERT_EQUAL(excited[map.bins[i]], map.excited[i]);
+        for (int kind = 0; kind < design_product_count; kind++) {
+            orders[kind >= (int)design_product_third_harmonic] += products[kind][map.bins[i]];
+        }
+        TEST_ASSERT_EQUAL_DOUBLE_MESSAGE((double)orders[0], map.second_order[i], message);
+        TEST_ASSERT_EQUAL_DOUBLE_MESSAGE((double)orders[1], map.third_order[i], message);
+    }
+    design_product_map_free(&map);
 }
 
 static void assert_as_one_by_one(const char *message)
@@ -135,6 +154,7 @@ static void test_intermodulation_of_random_sets_is_what_counting_finds(void)
         count();
         count_one_by_one();
         assert_as_one_by_one(message);
+        assert_map_as_one_by_one(message);
     }
 }
 

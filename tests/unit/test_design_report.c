@@ -44,7 +44,7 @@ static void write_section(void)
     FILE *stream = open_memstream(&text, &size);
     TEST_ASSERT_NOT_NULL(stream);
     page_start(&page, stream, "test", NULL);
-    design_report_section(&page, &request, &result);
+    design_report_sections(&page, &request, &result);
     TEST_ASSERT_EQUAL(0, page_end(&page, NULL));
     fclose(stream);
 }
@@ -58,7 +58,8 @@ static void test_design_report_shows_limits_and_figures(void)
 {
     char effective[64], start[64];
     write_section();
-    snprintf(effective, sizeof effective, "effective torque %.4f Nm", result.effective_torque_Nm);
+    snprintf(effective, sizeof effective, "Effective torque %.4f Nm, %.0f %% of the bound", result.effective_torque_Nm,
+             100 * result.effective_torque_Nm / result.bound_Nm);
     snprintf(start, sizeof start, "from sample %zu of the table", result.start_index);
     says(effective);
     says(start);
@@ -68,6 +69,61 @@ static void test_design_report_shows_limits_and_figures(void)
     says("8, 5 to 40 Hz");
     says("the zero crossing of the velocity");
     TEST_ASSERT_NULL(strstr(text, "acceleration in rad/s²")); // no limit of its own: no panel
+}
+
+/* The torque's limit alone binds first; with a velocity limit far below what that gives, the velocity's does. */
+static void test_design_report_names_the_limit_that_binds(void)
+{
+    write_section();
+    says("Held back by the limit of the torque (");
+    says("not by that of the velocity (");
+    tearDown();
+    request.limits.velocity_rad_per_s = 0.3;
+    write_section();
+    says("Held back by the limit of the velocity (");
+    says("not by that of the torque (");
+}
+
+static void test_design_report_warns_where_a_limit_is_passed_between_samples(void)
+{
+    write_section();
+    TEST_ASSERT_NULL(strstr(text, "Beyond a limit"));
+    tearDown();
+    request.grid = design_grid_samples;
+    request.period_samples = 20; // few samples for eight lines
+    request.rate_numerator_hz = 100;
+    write_section();
+    TEST_ASSERT_TRUE(result.peak_continuous.torque_Nm > 1.001);
+    says("Beyond a limit between the samples");
+}
+
+/* All lines from 1 on: products fall on each of them, and no bin is free. */
+static void test_design_report_maps_products_and_starts(void)
+{
+    char start[96];
+    write_section();
+    says("Intermodulation map");
+    says("on each of the 8 bins from the lowest to the highest line");
+    says("on a free bin (no data)");
+    snprintf(start, sizeof start, "Chosen: sample %zu with %.2g %%", result.start_index,
+             100 * result.expected_transient);
+    says(start);
+}
+
+static void test_design_report_section_is_one_among_others(void)
+{
+    struct error error;
+    struct page page;
+    size_t size = 0;
+    TEST_ASSERT_EQUAL_MESSAGE(0, design_run(&request, &result, &error), error.message);
+    FILE *stream = open_memstream(&text, &size);
+    page_start(&page, stream, "test", NULL);
+    design_report_section(&page, "table <1>", &request, &result);
+    TEST_ASSERT_EQUAL(1, page.sections);
+    TEST_ASSERT_EQUAL(0, page_end(&page, NULL));
+    fclose(stream);
+    says("table &lt;1&gt;");
+    says("Peaks against limits");
 }
 
 static void test_design_report_gives_acceleration_a_panel_if_limited(void)
@@ -95,6 +151,10 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_design_report_shows_limits_and_figures);
+    RUN_TEST(test_design_report_names_the_limit_that_binds);
+    RUN_TEST(test_design_report_warns_where_a_limit_is_passed_between_samples);
+    RUN_TEST(test_design_report_maps_products_and_starts);
+    RUN_TEST(test_design_report_section_is_one_among_others);
     RUN_TEST(test_design_report_gives_acceleration_a_panel_if_limited);
     RUN_TEST(test_design_report_shows_a_linear_axis_in_its_units);
     return UNITY_END();

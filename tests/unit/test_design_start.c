@@ -158,6 +158,15 @@ static void test_start_choice_is_the_least_of_all_samples(void)
     }
 }
 
+static void test_start_map_is_what_is_expected_at_each_sample(void)
+{
+    static double shares[period];
+    TEST_ASSERT_EQUAL_INT(0, design_start_map(&table, &model, design_loop_cascade, shares, &error));
+    for (size_t t0 = 0; t0 < period; t0++) {
+        TEST_ASSERT_DOUBLE_WITHIN(rounding, expected_share(design_loop_cascade, t0), shares[t0]);
+    }
+}
+
 static void test_start_choice_of_the_bank_is_the_least_mean_over_its_drives(void)
 {
     size_t chosen = period;
@@ -266,6 +275,7 @@ int main(void)
     RUN_TEST(test_start_expects_what_a_rigid_drive_without_delays_does);
     RUN_TEST(test_start_expects_what_a_drive_with_whole_samples_of_dead_time_does);
     RUN_TEST(test_start_choice_is_the_least_of_all_samples);
+    RUN_TEST(test_start_map_is_what_is_expected_at_each_sample);
     RUN_TEST(test_start_choice_of_the_bank_is_the_least_mean_over_its_drives);
     RUN_TEST(test_start_bank_is_valid_and_has_the_inertia_of_the_table);
     RUN_TEST(test_start_of_the_bank_exists_at_any_rate);

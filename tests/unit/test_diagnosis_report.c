@@ -76,7 +76,7 @@ static void test_diagnosis_report_has_linear_units_on_a_linear_axis(void)
     sample_diagnosis(true, &diagnosis);
     report();
     has("of the measured force");
-    has("force error in N<");
+    has("force error in N, model as given");
     has("speed in m/s");
     has("amplitude_N<");
     has_not("Nm");

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/excitation.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include "unity.h"

@@ -119,7 +119,7 @@ static void test_fft_of_lengths_with_a_large_prime_factor_is_exact(void)
 
 static void test_fft_plan_of_an_impossible_length_is_null(void)
 {
-    TEST_ASSERT_NULL(fft_plan_create((size_t)1 << 33));
+    TEST_ASSERT_NULL(fft_plan_create((size_t)1 << (sizeof(size_t) > 4 ? 33 : 31)));
     TEST_ASSERT_NULL(fft_plan_create(SIZE_MAX));
 }
 

@@ -175,15 +175,16 @@ static void reference_row(const int32_t *rows, uint32_t row, uint32_t terms, con
                         floor_shift(imaginary, 4);
 }
 
-static void reference_block(const struct frf_block_table *table, uint32_t start, struct reference_sum *io_sums)
+/* start: of the block, below 0 in front of the period, where there is nothing */
+static void reference_block(const struct frf_block_table *table, int64_t start, struct reference_sum *io_sums)
 {
     uint32_t block = table->layout.block_samples, terms = table->layout.terms;
     int64_t folded[FRF_BLOCK_SAMPLES_MAX], work[FRF_BLOCK_SAMPLES_MAX];
     int64_t scale = INT64_C(1) << (table->gain_shift + (table->basis ? 11u : 4u));
     for (uint32_t i = 0; i < block / 2u; i++) {
-        uint32_t right = start + block / 2u + i, left = start + block / 2u - 1u - i;
+        int64_t right = start + block / 2u + i, left = start + block / 2u - 1u - i;
         int64_t r = right < table->period_samples ? samples[right] : 0;
-        int64_t l = left < table->period_samples ? samples[left] : 0;
+        int64_t l = left >= 0 && left < table->period_samples ? samples[left] : 0;
         folded[2u * i] = (r + l) * scale;
         folded[2u * i + 1u] = (r - l) * scale;
         note(folded[2u * i], INT64_C(1) << 31);
@@ -204,8 +205,7 @@ static void reference_block(const struct frf_block_table *table, uint32_t start,
 
 static void expect_block(const struct frf_block_table *table, bool spread)
 {
-    static int32_t words[FRF_BLOCK_STORAGE_WORDS(block_bins_max, 1u, 2u, 128u, 64u)];
-    static int16_t frames[128];
+    static int32_t words[FRF_BLOCK_STORAGE_WORDS(block_bins_max, 1u, 2u, 128u, 64u) + FRF_BLOCK_SPREAD_WORDS(1u, 128u)];
     static struct reference_sum expected[block_bins_max];
     struct frf_block dft;
     struct frf_block_period latched;
@@ -214,12 +214,10 @@ static void expect_block(const struct frf_block_table *table, bool spread)
                                       .banks = 2,
                                       .spread = spread,
                                       .storage = words,
-                                      .storage_words = sizeof words / sizeof *words,
-                                      .frames = frames,
-                                      .frame_samples = 128};
+                                      .storage_words = sizeof words / sizeof *words};
     uint32_t block = table->layout.block_samples;
     memset(expected, 0, sizeof expected);
-    for (uint32_t start = 0; start < table->period_samples; start += block)
+    for (int64_t start = -(int64_t)table->lead_samples; start < table->period_samples; start += block)
         reference_block(table, start, expected);
     TEST_ASSERT_EQUAL_INT(core_ok, frf_block_init(&dft, &config));
     frf_block_add_i16(&dft, samples, table->period_samples);

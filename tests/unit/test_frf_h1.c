@@ -6,6 +6,7 @@
 #include "lab/estimate/circle.h"
 #include "lab/estimate/method.h"
 #include "lab/estimate/segments.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include "unity.h"

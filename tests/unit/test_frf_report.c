@@ -84,7 +84,7 @@ static void test_frf_report_counts_valid_lines(void)
     frf.valid[3] = false;
     write_section(NULL);
     says("7 of 8 lines valid");
-    says("magnitude in dB of 1 (rad/s)/Nm");
+    says("magnitude in dB, 0 dB is 1 (rad/s)/Nm");
     does_not_say("less model");
     does_not_say("known delay");
 }
@@ -179,6 +179,7 @@ static void test_frf_report_draws_a_model_with_its_region(void)
     says(">two masses<");
 }
 
+/* Without colour a triangle is a path of three sides, a square one of four, and a dot has no length. */
 static void test_frf_report_overlays_runs_in_shapes_of_their_own(void)
 {
     const struct frf runs[] = {frf, frf};
@@ -188,19 +189,58 @@ static void test_frf_report_overlays_runs_in_shapes_of_their_own(void)
     says(">run1.csv<");
     says(">run2.csv<");
     says("mean of 2 runs");
-    /* Without colour a triangle is a path of three sides, a square one of four, and a dot has no length. */
+    says("<path class=\"pt mf c2\"");
     says("<path class=\"pt mf c3\"");
-    says("<path class=\"pt mf c4\"");
     says("<path class=\"pt mc c1\"");
+    says("difference over 2 std, from run1.csv");
+    says("lies 0 dB higher than run1.csv (median of 8 lines in common)");
+    says("more than 2 std of the difference apart at 0 of 8 lines");
+}
+
+/* A response of its own lines: 5 % more at every other frequency, 0.025 and 0.0125 apart at 2 and 4 Hz, with 0.01 of std
+   each: 2 std of the difference are 0.0283. */
+static void test_frf_report_holds_a_saved_response_against_this_one(void)
+{
+    struct frf other;
+    struct error error;
+    TEST_ASSERT_EQUAL(0, frf_alloc(&other, 5, &error));
+    for (size_t k = 0; k < 5; k++) {
+        other.frequency_hz[k] = 2.0 * (double)(k + 1);
+        other.imag[k] = -(k == 0 ? 1.06 : 1.05) / other.frequency_hz[k];
+        other.std[k] = other.noise_std[k] = 0.01;
+        other.valid[k] = k != 3;
+    }
+    TEST_ASSERT_TRUE(frf_set_text(&other.units, "rad_per_s/Nm"));
+    static const char *const names[] = {"before.csv"};
+    const struct frf_report_options options = {
+        .name = "after.csv", .other_count = 1, .others = &other, .other_names = names};
+    write_section(&options);
+    frf_free(&other);
+    says(">after.csv<");
+    does_not_say(">measured<");
+    says(">before.csv<");
+    says("difference over 2 std, from after.csv");
+    says("lies 0.42 dB higher than after.csv (median of 3 lines in common)"); // 10 Hz is not there, 8 Hz not valid
+    says("apart at 1 of 3 lines");
+    says("furthest at 2 Hz, 1.06 times 2 std");
+}
+
+static void test_frf_report_takes_the_known_delay_of_a_held_input(void)
+{
+    TEST_ASSERT_TRUE(estimate_set_key(&frf, "hold", "zoh") && estimate_set_key(&frf, "sample_rate_hz", "500"));
+    TEST_ASSERT_EQUAL_DOUBLE(0.001, frf_report_known_delay_s(&frf));
+    write_section(NULL);
+    says("known delay of 1 ms (half a sample: the input is held between samples) is taken out of the phase shown");
 }
 
 static void test_frf_report_says_when_runs_are_too_many_to_draw(void)
 {
-    const struct frf runs[] = {frf, frf, frf, frf, frf};
-    static const char *const names[] = {"1", "2", "3", "4", "5"};
-    const struct frf_report_options options = {.run_count = 5, .runs = runs, .run_names = names};
+    const struct frf runs[frf_report_overlays_max + 1] = {frf, frf, frf, frf, frf, frf, frf, frf};
+    static const char *const names[frf_report_overlays_max + 1] = {"1", "2", "3", "4", "5", "6", "7", "8"};
+    const struct frf_report_options options = {
+        .run_count = frf_report_overlays_max + 1, .runs = runs, .run_names = names};
     write_section(&options);
-    says("5 runs are too many to be drawn one by one");
+    says("8 runs are too many to be drawn one by one");
 }
 
 static void test_frf_report_reaches_as_far_as_95_percent(void)
@@ -317,6 +357,8 @@ int main(void)
     RUN_TEST(test_frf_report_calls_a_model_a_model);
     RUN_TEST(test_frf_report_draws_a_model_with_its_region);
     RUN_TEST(test_frf_report_overlays_runs_in_shapes_of_their_own);
+    RUN_TEST(test_frf_report_holds_a_saved_response_against_this_one);
+    RUN_TEST(test_frf_report_takes_the_known_delay_of_a_held_input);
     RUN_TEST(test_frf_report_says_when_runs_are_too_many_to_draw);
     RUN_TEST(test_frf_report_reaches_as_far_as_95_percent);
     RUN_TEST(test_frf_report_knows_what_there_was_instead_of_periods);

@@ -2,6 +2,7 @@
 #include "lab/estimate/inputs.h"
 
 #include "lab/estimate/frf_mean.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include "unity.h"

@@ -30,6 +30,8 @@ struct fake_drive {
     size_t nan_reference_at;
     enum drive_status open_status, arm_status, stop_status;
     bool stopped;
+    bool interrupt_while_opening; ///< the user presses Ctrl-C then
+    bool armed;
     size_t setpoints_after_failure;
     bool failed;
     struct drive_counters counters;
@@ -47,12 +49,16 @@ static enum drive_status fake_open(void *self, const struct drive_configuration 
 {
     (void)self;
     TEST_ASSERT_EQUAL_DOUBLE(1000.0, configuration->sample_rate_hz);
+    if (fake.interrupt_while_opening) {
+        stop_flag = 1;
+    }
     return fake.open_status;
 }
 
 static enum drive_status fake_arm(void *self)
 {
     (void)self;
+    fake.armed = true;
     return fake.arm_status;
 }
 
@@ -353,6 +359,18 @@ static void test_measure_ramps_to_zero_when_a_limit_trips(void)
     check_ends_at_zero();
 }
 
+static void test_measure_does_not_arm_when_interrupted_while_the_drive_is_opened(void)
+{
+    const struct measure_plan plan = make_plan();
+    fake.interrupt_while_opening = true;
+    TEST_ASSERT_EQUAL_INT(error_refused, measure(&plan));
+    TEST_ASSERT_FALSE(fake.armed);
+    TEST_ASSERT_EQUAL_size_t(0, fake.exchanges);
+    TEST_ASSERT_EQUAL_size_t(0, run.rows);
+    TEST_ASSERT_EQUAL_INT(measure_interrupted, report.end);
+    TEST_ASSERT_NOT_NULL(strstr(error.message, "before the axis was armed"));
+}
+
 static void test_measure_stops_on_a_number_that_is_none_and_keeps_the_rest(void)
 {
     struct measure_plan plan = make_plan();
@@ -637,6 +655,7 @@ int main(void)
     RUN_TEST(test_measure_stops_when_too_many_samples_are_lost_in_a_row);
     RUN_TEST(test_measure_keeps_what_it_has_when_the_drive_faults_at_any_exchange);
     RUN_TEST(test_measure_ramps_to_zero_when_interrupted_at_any_exchange);
+    RUN_TEST(test_measure_does_not_arm_when_interrupted_while_the_drive_is_opened);
     RUN_TEST(test_measure_ramps_to_zero_when_a_limit_trips);
     RUN_TEST(test_measure_stops_on_a_number_that_is_none_and_keeps_the_rest);
     RUN_TEST(test_measure_says_why_the_drive_did_not_start);

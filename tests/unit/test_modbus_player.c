@@ -15,18 +15,6 @@ void tearDown(void)
     bench_end();
 }
 
-/// Waits, with a sign of life, until the drive is neither settling nor running nor stopping.
-static void follow(void)
-{
-    for (int i = 0; i < 1000; i++) {
-        TEST_ASSERT_EQUAL_INT(modbus_host_ok, modbus_host_read_state(&host, &state));
-        if (state.state == modbus_state_done || state.state == modbus_state_fault)
-            return;
-        bench_wait(NULL, 20);
-    }
-    TEST_FAIL_MESSAGE("the run does not end");
-}
-
 /// Runs until the drive ends by itself, silent: nothing is written.
 static uint32_t run_silently(uint32_t most)
 {
@@ -88,7 +76,7 @@ static void test_modbus_player_trips_at_its_limits(void)
         setup.run.velocity_limit = cases[i].velocity;
         setup.run.following_error = cases[i].following;
         bench_start(&host, &setup);
-        follow();
+        bench_follow(&host, &state);
         TEST_ASSERT_EQUAL_INT(modbus_state_fault, state.state);
         TEST_ASSERT_EQUAL_UINT32(cases[i].fault, state.faults);
         TEST_ASSERT_TRUE(state.trip_value != 0.0f);
@@ -107,7 +95,7 @@ static void test_modbus_player_stops_and_aborts_on_command(void)
         bench_start(&host, &setup);
         bench_wait(NULL, 1000);
         TEST_ASSERT_EQUAL_INT(modbus_host_ok, modbus_host_command(&host, cases[i].command));
-        follow();
+        bench_follow(&host, &state);
         TEST_ASSERT_EQUAL_INT(modbus_state_done, state.state);
         TEST_ASSERT_EQUAL_INT(cases[i].end, state.end);
         // 1000 ms less the fade are seven periods and a part, which counts for nothing.
@@ -125,7 +113,7 @@ static void test_modbus_player_faults_at_an_end_stop(void)
     modbus_drive_step(bench_drive);
     const struct modbus_host_setup setup = bench_setup(0, 100);
     bench_start(&host, &setup);
-    follow();
+    bench_follow(&host, &state);
     TEST_ASSERT_EQUAL_INT(modbus_state_fault, state.state);
     TEST_ASSERT_EQUAL_UINT32(modbus_fault_drive, state.faults);
 }

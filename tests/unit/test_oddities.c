@@ -71,7 +71,7 @@ static void assert_said(const char *part)
 static void test_oddities_of_a_good_run_are_none(void)
 {
     prepare();
-    TEST_ASSERT_EQUAL_INT(0, oddities_of_inertia(&run, &recording, inertia, &recording.oddities, &error));
+    TEST_ASSERT_EQUAL_INT(0, oddities_of_inertia(&run, &recording, inertia, true, &recording.oddities, &error));
     TEST_ASSERT_EQUAL_UINT(0, recording.oddities.count);
 }
 
@@ -107,7 +107,8 @@ static void test_oddities_refuse_a_position_in_degrees(void)
     scale(position, 360.0 / two_pi);
     scale(velocity, 360.0 / two_pi);
     prepare();
-    TEST_ASSERT_EQUAL_INT(error_refused, oddities_of_inertia(&run, &recording, inertia, &recording.oddities, &error));
+    TEST_ASSERT_EQUAL_INT(error_refused,
+                          oddities_of_inertia(&run, &recording, inertia, true, &recording.oddities, &error));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "degrees instead of rad"), error.message);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "position_rad=COLUMN*0.0174533"), error.message);
 }
@@ -116,14 +117,15 @@ static void test_oddities_refuse_a_torque_of_the_wrong_sign(void)
 {
     scale(torque, -1.0);
     prepare();
-    TEST_ASSERT_EQUAL_INT(error_refused, oddities_of_inertia(&run, &recording, inertia, &recording.oddities, &error));
+    TEST_ASSERT_EQUAL_INT(error_refused,
+                          oddities_of_inertia(&run, &recording, inertia, true, &recording.oddities, &error));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "accelerate backward"), error.message);
 }
 
 static void test_oddities_say_that_the_model_is_of_something_else(void)
 {
     prepare();
-    TEST_ASSERT_EQUAL_INT(0, oddities_of_inertia(&run, &recording, 4.0 * inertia, &recording.oddities, &error));
+    TEST_ASSERT_EQUAL_INT(0, oddities_of_inertia(&run, &recording, 4.0 * inertia, true, &recording.oddities, &error));
     assert_said("a model of something else");
 }
 
@@ -209,10 +211,10 @@ static void test_oddities_refuse_an_inertia_that_no_drive_is_off_by(void)
 {
     prepare();
     TEST_ASSERT_EQUAL_INT(error_refused,
-                          oddities_of_inertia(&run, &recording, 1e-3 * inertia, &recording.oddities, &error));
+                          oddities_of_inertia(&run, &recording, 1e-3 * inertia, true, &recording.oddities, &error));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "mNm instead of Nm"), error.message);
     TEST_ASSERT_EQUAL_INT(error_refused,
-                          oddities_of_inertia(&run, &recording, 300.0 * inertia, &recording.oddities, &error));
+                          oddities_of_inertia(&run, &recording, 300.0 * inertia, true, &recording.oddities, &error));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "a model of something else"), error.message);
 }
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/// The command line's options: tools/servoscope/options.h. The parser belongs to no room, so its source is part of this
+/// The command line's options: tools/servoscope/options.h. The parser belongs to no room, so its sources are part of this
 /// test.
 #include "tools/servoscope/options.c"
+#include "tools/servoscope/suggest.c"
 
 #include "unity.h"
 

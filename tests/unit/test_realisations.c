@@ -2,6 +2,7 @@
 #include "lab/estimate/circle.h"
 #include "lab/estimate/method.h"
 #include "lab/estimate/realisations.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include "unity.h"

@@ -218,7 +218,9 @@ static void test_run_read_takes_the_rate_from_time_stamps(void)
 
 static void test_run_read_refuses_time_that_stands_jumps_or_contradicts(void)
 {
-    refuse("time_s,torque_Nm\n0,1\n0.001,1\n0.001,1\n", "run.csv:4: time_s: 0.001 follows 0.001: time has to increase");
+    refuse("time_s,torque_Nm\n0,1\n0.001,1\n0.001,1\n",
+           "run.csv:4: time_s: 0.001 follows 0.001: time has to increase (--rate HZ trusts the rate "
+           "and leaves the time stamps unjudged)");
     refuse("time_s,torque_Nm\n0,1\n0.001,1\n0.002,1\n0.003,1\n\n0.006,1\n0.007,1\n",
            "run.csv:7: time_s: 0.006 follows 0.003: 2 samples are missing, a step of 0.001 s was expected");
     refuse("# sample_rate_hz: 900\ntime_s,torque_Nm\n0,1\n0.001,1\n0.002,1\n",

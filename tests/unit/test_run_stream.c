@@ -166,7 +166,9 @@ static void test_run_stream_refuses_in_pieces_what_run_read_refuses(void)
         {"time_s,valid\n0,1\n1,2\n", "run.csv:3: valid: 2: 0 or 1 was expected"},
         {"time_s,torque_Nm\n0,1\n2\n", "run.csv:3: row has 1 cells, the row of names (line 1) has 2"},
         {"torque_Nm\n", "run.csv:2: the file ends without a row of numbers"},
-        {"time_s,torque_Nm\n0,0\n1,0\n2,0\n2,0\n", "run.csv:5: time_s: 2 follows 2: time has to increase"},
+        {"time_s,torque_Nm\n0,0\n1,0\n2,0\n2,0\n",
+         "run.csv:5: time_s: 2 follows 2: time has to increase (--rate HZ trusts the rate and "
+         "leaves the time stamps unjudged)"},
         {"time_s,torque_Nm\n0,0\n1,0\n2,0\n3,0\n\n6,0\n7,0\n",
          "run.csv:7: time_s: 6 follows 3: 2 samples are missing, a step of 1 s was expected"},
         {"# sample_rate_hz: 900\ntime_s,torque_Nm\n0,1\n0.001,1\n0.002,1\n",

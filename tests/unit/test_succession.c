@@ -3,6 +3,7 @@
 
 #include "lab/estimate/circle.h"
 #include "lab/estimate/frf_mean.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include "unity.h"

@@ -11,6 +11,7 @@
 
 struct arguments {
     const char *to;
+    const char *out; ///< of --out, or the second operand
     long long function;
     struct format_options reading;
     struct option_values files;
@@ -27,13 +28,23 @@ static int read_options(int argc, char **argv, struct arguments *out, struct err
 {
     const struct option options[] = {
         {.name = "to", .kind = option_text, .target = &out->to},
+        {.name = "out", .kind = option_text, .target = &out->out},
         {.name = "map", .kind = option_text, .target = &out->reading.run.map},
         {.name = "rate", .kind = option_positive, .target = &out->reading.run.rate_hz},
         {.name = "function", .kind = option_integer, .target = &out->function, .lowest = 1, .highest = 1e6},
     };
-    const struct option_operands operands = {"IN OUT", 2, 2, &out->files};
+    const struct option_operands operands = {"IN OUT", 1, 2, &out->files};
     int status = options_parse(argc, argv, options, sizeof options / sizeof options[0], &operands, out_error);
     out->reading.function = (size_t)out->function;
+    if (!status && (out->out != NULL) == (out->files.count == 2)) {
+        return out->out ? error_set(out_error, error_usage, "OUT is given twice: '%s' and --out '%s'",
+                                    out->files.items[1], out->out)
+                        : error_set(out_error, error_usage,
+                                    "IN OUT is missing: expected two files; see 'servoscope convert --help'");
+    }
+    if (!status && !out->out) {
+        out->out = out->files.items[1];
+    }
     return status;
 }
 
@@ -158,7 +169,7 @@ static int run(int argc, char **argv, const struct command_context *context, str
         return status;
     }
     conversion.in = arguments.files.items[0];
-    conversion.out = arguments.files.items[1];
+    conversion.out = arguments.out;
     status = choose_format(&arguments, conversion.out, &conversion.to, out_error);
     status = status ? status : outputs_check(&conversion.in, 1, &conversion.out, 1, out_error);
     status = status ? status : convert(&arguments, &conversion, out_error);
@@ -181,8 +192,10 @@ const struct command command_cmd_convert = {
         "usage: servoscope convert IN OUT [options]\n"
         "\n"
         "  IN                   its content says its format, plain or gzipped (but for .mat): those below,\n"
-        "                       text exports of the TwinCAT Scope, tables with tabs, semicolons or decimal commas\n"
+        "                       text exports of the TwinCAT Scope, tables of others: tabs, semicolons or commas,\n"
+        "                       decimal commas, marks between thousands, times of day, UTF-16\n"
         "  OUT                  its ending says its format: .csv, .gp, .mat, .uff or .unv\n"
+        "  --out OUT            the same, as other subcommands have it\n"
         "  --to FORMAT          whatever the ending:\n"
         "                       csv     servoscope's own files, the only ones that lose nothing\n"
         "                       gnuplot a script with the numbers in it, to look at: gnuplot -p FILE.gp\n"
@@ -195,8 +208,8 @@ const struct command command_cmd_convert = {
         "                       position_m, velocity_m_per_s, current_A, current_ref_A, valid (all: docs/files.md);\n"
         "                       the map takes the place of all guesses, and what it does not name stays as it is\n"
         "                       COLUMN in a .mat: a variable, log.speed a field, data:2 the second column of a matrix\n"
-        "                       a unit in the header counts, but not in a CSV with commas and decimal points;\n"
-        "                       of several sample times --rate chooses one\n"
+        "                       a unit in the header of a table counts unless the map gives a factor; of several\n"
+        "                       sample times --rate chooses one\n"
         "  --function NUMBER    which of the frequency responses of a universal file\n"
         "\n"
         "What was assumed, what the format has no place for and where it was kept, and what is lost, is printed.\n"

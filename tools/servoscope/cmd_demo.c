@@ -9,6 +9,7 @@
 #include "lab/record/frf_file.h"
 #include "lab/record/json_out.h"
 #include "lab/record/model_file.h"
+#include "ports/wall_clock.h"
 #include "tools/servoscope/command.h"
 #include "tools/servoscope/demo_page.h"
 #include "tools/servoscope/designing.h"
@@ -22,7 +23,6 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { path_size = 4096, settle_periods = 1, counted_periods = 10 };
@@ -55,13 +55,6 @@ struct demo {
     struct diagnosis diagnosis;
 };
 
-static double now_s(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
 /// A line of the story, with the seconds since the beginning.
 #if defined(__GNUC__)
 __attribute__((format(printf, 2, 3)))
@@ -74,7 +67,7 @@ tell(const struct demo *self, const char *format, ...)
         return;
     }
     va_start(arguments, format);
-    printf("%5.1f s  ", now_s() - self->started_s);
+    printf("%5.1f s  ", wall_clock_now_s() - self->started_s);
     vprintf(format, arguments);
     putchar('\n');
     fflush(stdout);
@@ -361,7 +354,7 @@ static int print_json(const struct demo *self, struct error *out_error)
     cJSON_AddNumberToObject(nrmse, "noise_floor", d->noise_floor_nrmse);
     cJSON_AddStringToObject(object, "folder", self->folder);
     cJSON_AddStringToObject(object, "open", in_folder(self, "report.html", path));
-    cJSON_AddNumberToObject(object, "seconds", now_s() - self->started_s);
+    cJSON_AddNumberToObject(object, "seconds", wall_clock_now_s() - self->started_s);
     int status = json_print_stdout(object, out_error);
     cJSON_Delete(object);
     return status;
@@ -381,7 +374,7 @@ static void free_demo(struct demo *self)
 static int run(int argc, char **argv, const struct command_context *context, struct error *out_error)
 {
     static struct demo demo; // too large for some stacks
-    demo = (struct demo){.folder = "servoscope-demo", .seed = 1, .context = context, .started_s = now_s()};
+    demo = (struct demo){.folder = "servoscope-demo", .seed = 1, .context = context, .started_s = wall_clock_now_s()};
     const struct option options[] = {
         {.name = "seed", .kind = option_integer, .target = &demo.seed, .lowest = 0, .highest = 9e15},
         {.name = "out", .kind = option_text, .target = &demo.folder},

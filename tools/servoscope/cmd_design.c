@@ -6,6 +6,7 @@
 #include "lab/design/offset.h"
 #include "lab/design/predict.h"
 #include "lab/design/sequence.h"
+#include "lab/record/dft_header.h"
 #include "lab/record/json_out.h"
 #include "lab/record/model_file.h"
 #include "tools/servoscope/command.h"
@@ -33,6 +34,7 @@ struct work {
     struct separating separating; ///< with --separate
     const struct command_context *context;
     struct terminal_line line;
+    unsigned dft_kinds; ///< with --dft-header
 };
 
 static void show_progress(void *context, double share_done, double effective)
@@ -72,16 +74,16 @@ static int read_models(struct work *self, struct error *out_error)
     return status;
 }
 
-/// The three files of the prefix and the page, against the list of lines and against each other.
+/// The files of the prefix and the page, against the list of lines and against each other.
 static int check_outputs(const struct design_options *options, struct error *out_error)
 {
     static const char list[] = "list:";
-    static const char *const endings[] = {".mst", ".csv", ".h"};
-    enum { endings_count = 3 };
+    static const char *const endings[] = {".mst", ".csv", ".h", "-dft.h"};
+    enum { endings_count = 4 };
     const char *input = strncmp(options->lines, list, sizeof list - 1) == 0 ? options->lines + sizeof list - 1 : NULL;
     const char *outputs[endings_count + 1] = {NULL};
     char *names[endings_count];
-    const size_t size = strlen(options->out) + sizeof ".mst";
+    const size_t size = strlen(options->out) + sizeof "-dft.h";
     bool memory = true;
     for (size_t i = 0; i < endings_count; i++) {
         outputs[i] = names[i] = malloc(size);
@@ -154,6 +156,24 @@ static int interrupted(struct error *out_error)
     return error_set(out_error, error_refused, "interrupted: the best so far was written, the search was not finished");
 }
 
+/// PREFIX-dft.h, for the firmware that measures with this table.
+static int write_dft_header(const struct work *self, const struct design_result *result, struct error *out_error)
+{
+    const size_t size = strlen(self->options->out) + sizeof "-dft.h";
+    if (self->dft_kinds == 0) {
+        return 0;
+    }
+    char *path = malloc(size);
+    if (!path) {
+        return error_set(out_error, error_refused, "memory is short for the file names");
+    }
+    snprintf(path, size, "%s-dft.h", self->options->out);
+    int status = dft_header_write(path, result->bins, (uint32_t)result->bin_count, (uint32_t)result->period_samples,
+                                  self->dft_kinds, out_error);
+    free(path);
+    return status;
+}
+
 static int deliver(const struct work *self, const struct design_request *played, const struct design_result *result,
                    const double *predicted_std, struct error *out_error)
 {
@@ -166,9 +186,10 @@ static int deliver(const struct work *self, const struct design_request *played,
                        settle_time_s(self, result->period_samples),
         .predicted_std = predicted_std,
     };
-    int status = designing_write(options->out, played, result, out_error);
+    int status = write_dft_header(self, result, out_error);
+    status = status ? status : designing_write(options->out, played, result, out_error);
     if (!status && options->report) {
-        status = designing_report(options->report, played, result, out_error);
+        status = designing_report(options->report, options->out, played, result, out_error);
     }
     if (!status && self->context->json) {
         cJSON *object = design_summary_json(&summary);
@@ -245,6 +266,7 @@ static cJSON *describe(void *context, const char *prefix, const struct design_re
 static int check_sequence_options(const struct design_options *options, struct error *out_error)
 {
     const char *refused = options->predict                       ? "predict"
+                          : options->dft_header                  ? "dft-header"
                           : options->stroke || options->stroke_m ? "stroke"
                           : fabs(options->bias_velocity_rad_per_s) > 0 || fabs(options->bias_velocity_m_per_s) > 0
                               ? "bias-velocity"
@@ -293,6 +315,9 @@ static int run(int argc, char **argv, const struct command_context *context, str
     int status = design_options_read(argc, argv, &options, out_error);
     status = status ? status : design_options_resolve(&options, &work.request, out_error);
     status = status ? status : design_options_offset(&options, &work.request, &work.offset, out_error);
+    if (!status && options.dft_header) {
+        status = dft_header_parse("--dft-header", options.dft_header, &work.dft_kinds, out_error);
+    }
     status = status ? status : read_models(&work, out_error);
     if (!status && (options.separate || options.model)) {
         status = separating_prepare(&options, &work.request, &work.separating, out_error);
@@ -380,7 +405,9 @@ const struct command command_cmd_design = {
             "  --settle-time S      for settling (default one period)\n"
             "  --predict MODEL.json expected standard deviation of the response, with the model's noise\n"
             "\n"
-            "  --report FILE.html   a page: the period against its limits, the spectrum, the figures\n",
+            "  --report FILE.html   a page: the period against its limits, the spectrum, the figures\n"
+            "  --dft-header KINDS   PREFIX-dft.h, const tables for a firmware that measures with this table: block,\n"
+            "                       folded (the period folded where the lines allow it), q15, q31, with commas\n",
     .more_help =
         "\n"
         "Telling two causes apart that a diagnosis could not:\n"

@@ -114,7 +114,7 @@ static int check_alike(const struct inputs *inputs, const struct arguments *argu
 /// Reads all files before any work starts. free_inputs() in every case.
 static int read_inputs(const struct arguments *arguments, struct inputs *out, struct error *out_error)
 {
-    const struct run_options options = {.map = arguments->map, .rate_hz = arguments->rate_hz};
+    const struct run_options options = {.map = arguments->map, .rate_hz = arguments->rate_hz, .guess = true};
     size_t total = arguments->runs.count + arguments->validate.count;
     *out = (struct inputs){.fit_count = arguments->runs.count, .runs = calloc(total, sizeof *out->runs)};
     if (!out->runs) {
@@ -172,15 +172,18 @@ static void print_heading(const char *heading)
     printf("\n%s\n", heading);
 }
 
-static void print_causes(const char *heading, const struct diagnosis_cause *causes, size_t count)
+static void print_causes(const struct diagnosis *self, const char *heading, const struct diagnosis_cause *causes,
+                         size_t count)
 {
     if (count > 0) {
         print_heading(heading);
     }
     for (size_t i = 0; i < count; i++) {
-        char name[wording_short];
+        char name[wording_short], unseen[wording_size];
         wording_effect(causes[i].effect, name);
-        printf("  %s (evidence %.1f nats): %s\n", name, causes[i].evidence, causes[i].says);
+        wording_unseen(self, &causes[i], unseen);
+        printf("  %s (evidence %.1f nats): %s%s%s\n", name, causes[i].evidence, causes[i].says, unseen[0] ? " " : "",
+               unseen);
     }
 }
 
@@ -202,15 +205,39 @@ static void print_gain(const struct diagnosis *self)
         print_figures("extended", &self->extended);
     }
     printf("  %-15s %10s %14.3f\n", "perfect model", noise, 1.0);
+    const char *remark = wording_refit(self);
+    if (remark) {
+        printf("%s\n", remark);
+    }
+}
+
+/// Where a model is wrong, and what of that is noise.
+static void print_misfit(const struct diagnosis *self, const char *name, enum misfit_model model)
+{
+    char where[wording_size], noise[wording_short];
+    wording_percent(misfit_noise_share(&self->misfit, model), noise);
+    wording_where(self, &self->misfit, model, where);
+    if (!misfit_is_left(&self->misfit, model))
+        printf("  %-15s nothing beyond noise\n", name);
+    else
+        printf("  %-15s %s; noise is %s of what it leaves, squared\n", name, where[0] ? where : "everywhere alike",
+               noise);
+}
+
+static void print_where(const struct diagnosis *self)
+{
+    print_heading("Where it is wrong, on unseen data");
+    print_misfit(self, self->model_given ? "model as given" : "rigid body", misfit_given);
+    print_misfit(self, wording_is_extended(self) ? "extended" : "refitted", misfit_extended);
 }
 
 static void print_limits(const struct diagnosis *self)
 {
     if (self->verdict == diagnosis_unexplained) {
-        char share[wording_short];
-        wording_percent(self->unexplained_share, share);
+        char left[wording_size];
+        wording_left(self, left);
         print_heading("Unexplained");
-        printf("  %s of the given model's misfit stays%s%s\n", share, self->where[0] ? ": " : "", self->where);
+        printf("  %s.\n", left);
     }
     if (self->untestable_count > 0) {
         print_heading("Not tested for");
@@ -244,9 +271,10 @@ static void print_summary(const struct diagnosis *self, const struct arguments *
     for (size_t i = 0; i < self->oddities.count; i++) {
         printf("Note: %s\n", self->oddities.texts[i]);
     }
-    print_causes("Causes", self->causes, self->cause_count);
-    print_causes("What might be, without being claimed", self->candidates, self->candidate_count);
+    print_causes(self, "Causes", self->causes, self->cause_count);
+    print_causes(self, "What might be, without being claimed", self->candidates, self->candidate_count);
     print_gain(self);
+    print_where(self);
     print_limits(self);
     print_next(self);
     size_t count = list_outputs(arguments, outputs);
@@ -323,6 +351,7 @@ const struct command command_cmd_diagnose = {
             "  --map NAME=COLUMN[*SCALE],...  --rate HZ    for recordings of others; hold for every run named\n"
             "                       NAME is torque_Nm, torque_ref_Nm, position_rad, velocity_rad_per_s, force_N,\n"
             "                       position_m, velocity_m_per_s, current_A, current_ref_A (all: docs/files.md)\n"
+            "                       without --map columns are named by the units in their names, and a note says how;\n"
             "                       values are taken times SCALE, whatever unit COLUMN names:\n"
             "                       position_rad=angle_deg*0.0174532925\n"
             "                       semicolons, tabs, decimal commas, MATLAB: servoscope convert first\n"

@@ -16,6 +16,7 @@
 #include "lab/record/manifest.h"
 #include "lab/record/run.h"
 #include "tools/servoscope/command.h"
+#include "tools/servoscope/comparing.h"
 #include "tools/servoscope/estimating_matrix.h"
 #include "tools/servoscope/estimating_outcome.h"
 #include "tools/servoscope/estimating_page.h"
@@ -32,6 +33,7 @@
 
 struct arguments {
     struct option_values runs;
+    struct option_values compare; ///< saved responses
     const char *method;
     const char *settle;
     const char *input;
@@ -86,7 +88,8 @@ static int read_options(int argc, char **argv, struct arguments *out, struct err
         {.name = "design", .kind = option_text, .target = &out->design},
         {.name = "hold", .kind = option_text, .target = &out->hold},
         {.name = "delay", .kind = option_number, .target = &out->delay_s, .highest = 1e6},
-        {.name = "out", .kind = option_text, .target = &out->out, .required = true},
+        {.name = "compare", .kind = option_list, .target = &out->compare},
+        {.name = "out", .kind = option_text, .target = &out->out},
         {.name = "report", .kind = option_text, .target = &out->report},
     };
     const struct option_operands operands = {"RUN.csv", 1, option_values_max, &out->runs};
@@ -213,32 +216,6 @@ static int read_lines(const struct arguments *arguments, const struct run *run, 
     return status;
 }
 
-static bool summarise(const struct periodic *recording, struct estimating_summary *out_summary)
-{
-    *out_summary = (struct estimating_summary){
-        .period_samples = recording->period_samples,
-        .total = recording->total,
-        .settle = recording->settle,
-        .lost = recording->lost,
-        .first_lost_row = recording->first_lost_row,
-        .lost_outside = recording->lost_outside,
-        .first_lost_outside = recording->first_lost_outside,
-        .used = recording->used,
-        .period_found = recording->period_found,
-        .bins_found = recording->bins_found,
-        .doubtful = recording->doubtful_count,
-        .transient = recording->transient,
-        .first_level = periodic_first_level(recording),
-        .last_level = periodic_last_level(recording),
-    };
-    estimate_advise(recording, &out_summary->advice);
-    out_summary->levels = malloc(recording->total * sizeof *out_summary->levels);
-    if (out_summary->levels) {
-        memcpy(out_summary->levels, recording->output_level, recording->total * sizeof *out_summary->levels);
-    }
-    return out_summary->levels != NULL;
-}
-
 /// A model by itself is no measurement: the page shows it beside the lines that it was fitted to.
 static int estimate_by(const struct request *request, const struct periodic *recording, struct frf *out_frf,
                        struct estimating_summary *io_summary, struct error *out_error)
@@ -296,8 +273,9 @@ static int estimate_periods(const struct run *run, const struct request *request
     if (status) {
         return status;
     }
-    status = summarise(recording, out_summary) ? estimate_by(request, recording, out_frf, out_summary, out_error)
-                                               : error_set(out_error, error_refused, "memory is short");
+    status = estimating_summary_make(recording, out_summary)
+                 ? estimate_by(request, recording, out_frf, out_summary, out_error)
+                 : error_set(out_error, error_refused, "memory is short");
     if (!status && (!estimating_findings_measure(recording, inputs, out_frf, &out_summary->findings) ||
                     !estimating_checks_measure(&clocked, out_frf, &out_summary->checks) ||
                     !estimating_summary_excite(out_summary, recording))) {
@@ -354,21 +332,6 @@ struct segments_context {
     struct estimating_summary *whole;
 };
 
-/// Of several segments the one that settled worst speaks for all.
-static void merge_summary(struct estimating_summary *whole, const struct estimating_summary *one)
-{
-    struct estimating_summary before = *whole;
-    if (before.used_most == 0 || one->last_level > before.last_level) {
-        *whole = *one;
-        whole->findings = before.findings;
-        whole->excitations = before.excitations;
-    }
-    whole->used = before.used_most == 0 || one->used < before.used ? one->used : before.used;
-    whole->used_most = one->used > before.used_most ? one->used : before.used_most;
-    whole->lost = before.lost + one->lost;
-    whole->first_lost_row = before.lost > 0 ? before.first_lost_row : one->first_lost_row;
-}
-
 static int estimate_segment(void *context, const char *path, const struct run_sequence_segment *segment,
                             struct frf *out_frf, struct error *out_error)
 {
@@ -381,7 +344,7 @@ static int estimate_segment(void *context, const char *path, const struct run_se
     estimating_summary_drop(&one);
     status = excited ? status : estimate_refuse_memory(out_frf, out_error);
     if (!status) {
-        merge_summary(self->whole, &one);
+        estimating_summary_merge(self->whole, &one);
         status = estimating_findings_merge(&self->whole->findings, &one.findings)
                      ? 0
                      : estimate_refuse_memory(out_frf, out_error);
@@ -450,21 +413,34 @@ static int write_files(const struct arguments *arguments, const struct estimatin
     return atomic_file_commit(&page, out_error);
 }
 
+static int say_outcome(const struct arguments *arguments, const struct estimating_outcome *outcome,
+                       const struct comparing *compared, const struct command_context *context, struct error *out_error)
+{
+    if (context->json) {
+        cJSON *object = estimating_outcome_json(outcome, &arguments->runs, arguments->out);
+        int status = comparing_add_json(compared, &outcome->frf, object, out_error);
+        status = status ? status : json_print_stdout(object, out_error);
+        cJSON_Delete(object);
+        return status;
+    }
+    if (context->quiet) {
+        return 0;
+    }
+    estimating_outcome_print(outcome, &arguments->runs, arguments->out);
+    return comparing_print(compared, &outcome->frf, arguments->out, out_error);
+}
+
 static int write_and_report(const struct arguments *arguments, const struct estimating_outcome *outcome,
                             const struct command_context *context, struct error *out_error)
 {
-    const struct estimating_page_item item = {outcome, &arguments->runs, arguments->out};
-    int status = write_files(arguments, &item, 1, out_error);
-    if (status) {
-        return status;
-    }
-    if (context->json) {
-        return print_json(estimating_outcome_json(outcome, &arguments->runs, arguments->out), out_error);
-    }
-    if (!context->quiet) {
-        estimating_outcome_print(outcome, &arguments->runs, arguments->out);
-    }
-    return 0;
+    struct comparing compared = {0};
+    const struct estimating_page_item item = {outcome, &arguments->runs, arguments->out, &compared};
+    int status = comparing_read(&arguments->compare, &compared, out_error);
+    status = status ? status : comparing_check(&compared, &outcome->frf, arguments->out, out_error);
+    status = status ? status : write_files(arguments, &item, 1, out_error);
+    status = status ? status : say_outcome(arguments, outcome, &compared, context, out_error);
+    comparing_free(&compared);
+    return status;
 }
 
 /// Passes on why runs cannot be taken together: "run 2" becomes "run 2 (other.csv)".
@@ -636,7 +612,7 @@ static int report_pairs(const struct arguments *arguments, const struct estimati
     const size_t count = matrix->input_count * matrix->output_count;
     struct estimating_page_item *items = malloc(count * sizeof *items);
     for (size_t i = 0; i < count && items; i++) {
-        items[i] = (struct estimating_page_item){&outcomes[i], &pairs[i].runs, pairs[i].out};
+        items[i] = (struct estimating_page_item){&outcomes[i], &pairs[i].runs, pairs[i].out, NULL};
     }
     int status = items ? write_files(arguments, items, count, out_error)
                        : error_set(out_error, error_refused, "memory is short");
@@ -654,11 +630,10 @@ static int estimate_matrix(const struct arguments *arguments, const struct reque
                            const struct command_context *context, struct error *out_error)
 {
     const size_t count = request->matrix->input_count * request->matrix->output_count;
-    if (arguments->model_out) {
+    if (arguments->model_out || arguments->compare.count > 0) {
         return error_set(out_error, error_usage,
-                         "--model-out: %zu responses give as many models, expected --input COLUMN "
-                         "and --output COLUMN too",
-                         count);
+                         "--%s: there are %zu responses, expected --input COLUMN and --output COLUMN too",
+                         arguments->model_out ? "model-out" : "compare", count);
     }
     struct arguments *pairs = calloc(count, sizeof *pairs);
     struct estimating_outcome *outcomes = calloc(count, sizeof *outcomes);
@@ -690,6 +665,26 @@ static int estimate_and_report(const struct arguments *arguments, const struct r
     return status;
 }
 
+/// The outputs against everything that is read.
+static int check_outputs(const struct arguments *arguments, struct error *out_error)
+{
+    const char *outputs[] = {arguments->out, arguments->report, arguments->model_out};
+    int status = outputs_check(arguments->runs.items, arguments->runs.count, outputs, 3, out_error);
+    return status ? status : outputs_check(arguments->compare.items, arguments->compare.count, outputs, 3, out_error);
+}
+
+/// Responses in the place of runs: nothing is to be estimated.
+static int compare_saved(const struct arguments *arguments, const struct command_context *context,
+                         struct error *out_error)
+{
+    const struct comparing_request request = {&arguments->runs, &arguments->compare, arguments->report};
+    if (arguments->out) {
+        return error_set(out_error, error_usage, "--out: %s is a response already, expected --report alone",
+                         arguments->runs.items[0]);
+    }
+    return comparing_run(&request, context, out_error);
+}
+
 static int run(int argc, char **argv, const struct command_context *context, struct error *out_error)
 {
     struct arguments arguments = {.method = "mean"};
@@ -697,8 +692,13 @@ static int run(int argc, char **argv, const struct command_context *context, str
     struct request request;
     int status = read_options(argc, argv, &arguments, out_error);
     status = status ? status : read_request(&arguments, &request, out_error);
-    const char *outputs[] = {arguments.out, arguments.report, arguments.model_out};
-    status = status ? status : outputs_check(arguments.runs.items, arguments.runs.count, outputs, 3, out_error);
+    status = status ? status : check_outputs(&arguments, out_error);
+    if (!status && frf_file_is(arguments.runs.items[0])) {
+        return compare_saved(&arguments, context, out_error);
+    }
+    if (!status && !arguments.out) {
+        status = error_set(out_error, error_usage, "--out is missing; see 'servoscope frf --help'");
+    }
     const struct estimating_matrix_request asked = {arguments.design, arguments.input, arguments.output,
                                                     arguments.lines};
     status = status ? status : estimating_matrix_open(&asked, &matrix, out_error);
@@ -718,6 +718,7 @@ const struct command command_cmd_frf = {
         "servoscope frf: frequency response of a periodic recording, with its standard deviation\n"
         "\n"
         "usage: servoscope frf RUN.csv [more.csv] [options] --out FRF.csv\n"
+        "       servoscope frf FRF.csv [more.csv] --report FILE.html\n"
         "\n"
         "  --method mean        mean over periods, variance from their scatter (default)\n"
         "  --method hann        Hann window over all periods: robust to what is left of a transient, 1.8 dB more "
@@ -763,6 +764,8 @@ const struct command command_cmd_frf = {
         "  --out FRF.csv        frequency_hz,real,imag,std,noise_std,...,valid\n"
         "  --report FILE.html   a page: what was found, Bode diagram with 95 % regions, residuals, distortion, "
         "settling\n"
+        "  --compare FRF.csv... saved responses, drawn into the same figure and held against this one\n",
+    .more_help =
         "\n"
         "The manifest that measure writes for a sequence (octaves, dwell) stands for all of its runs: each segment "
         "is\n"
@@ -783,7 +786,11 @@ const struct command command_cmd_frf = {
         "samples,\n"
         "or drifts, the recording is resampled to it.\n"
         "\n"
-        "example:\n"
-        "  servoscope frf run.csv --out frf.csv\n",
+        "Saved responses in the place of runs are compared with the first of them, in sentences and with --report on a "
+        "page.\n"
+        "\n"
+        "examples:\n"
+        "  servoscope frf run.csv --out frf.csv\n"
+        "  servoscope frf run.csv --out after.csv --compare before.csv --report after.html\n",
     .run = run,
 };

@@ -3,6 +3,7 @@
 #include "tools/servoscope/command.h"
 #include "tools/servoscope/help_text.h"
 #include "tools/servoscope/options.h"
+#include "tools/servoscope/suggest.h"
 
 #include <ctype.h>
 #include <stdio.h>
@@ -140,13 +141,18 @@ static int run(int argc, char **argv, const struct command_context *context, str
         print_program();
         return 0;
     }
+    struct suggestion suggestion;
+    suggest_begin(&suggestion, name.items[0], strlen(name.items[0]));
     for (size_t i = 0; commands[i]; i++) {
         if (strcmp(commands[i]->name, name.items[0]) == 0) {
             print_command(commands[i]);
             return 0;
         }
+        suggest_consider(&suggestion, commands[i]->name);
     }
-    return error_set(out_error, error_usage, "'%s' is not a subcommand; 'servoscope --help' lists them", name.items[0]);
+    const char *meant = suggest_found(&suggestion);
+    return error_set(out_error, error_usage, "'%s' is not a subcommand%s%s%s 'servoscope --help' lists them",
+                     name.items[0], meant ? ": did you mean " : ";", meant ? meant : "", meant ? "?" : "");
 }
 
 const struct command command_cmd_manual = {

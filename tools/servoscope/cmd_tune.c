@@ -16,6 +16,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#ifndef SERVOSCOPE_VERSION
+#define SERVOSCOPE_VERSION "0.1.0"
+#endif
+
 struct arguments {
     struct option_values files;
     struct tune_options tune;
@@ -191,15 +195,19 @@ static int write_page(const struct arguments *arguments, const struct frf *frf, 
     struct atomic_file file;
     struct page page;
     char title[160];
+    char subtitle[320];
     FILE *stream = atomic_file_open(&file, arguments->report, out_error);
     if (!stream) {
         return error_refused;
     }
     snprintf(title, sizeof title, "A %s controller of %.4g Hz", arguments->tune.structure,
              arguments->tune.bandwidth_hz);
-    page_start(&page, stream, title, arguments->files.items[0]);
+    snprintf(subtitle, sizeof subtitle, "for %s to %s as measured in %s", frf->input, frf->output,
+             arguments->files.items[0]);
+    page_start(&page, stream, title, subtitle);
     tune_report_sections(&page, frf, result);
-    page_end(&page, NULL);
+    // A write error is kept by the stream, and commit reports it with the path and the reason.
+    (void)page_end(&page, "servoscope " SERVOSCOPE_VERSION);
     return atomic_file_commit(&file, out_error);
 }
 

@@ -108,7 +108,7 @@ static void write_sections(FILE *stream, const struct demo_page *self, const str
     snprintf(subtitle, sizeof subtitle, "servoscope demo --seed %lld: belt drive on a simulated CAN bus", self->seed);
     page_start(&page, stream, "From limits to a named cause", subtitle);
     add_story(&page, self);
-    design_report_section(&page, self->request, self->design);
+    design_report_section(&page, "Excitation", self->request, self->design);
     add_measurement(&page, self);
     frf_report_section(&page, self->measured, &options);
     diagnosis_report_sections(&page, self->diagnosis);

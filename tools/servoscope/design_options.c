@@ -35,6 +35,7 @@ int design_options_read(int argc, char **argv, struct design_options *out, struc
         {.name = "lines", .kind = option_text, .target = &out->lines, .required = true},
         {.name = "out", .kind = option_text, .target = &out->out, .required = true},
         {.name = "report", .kind = option_text, .target = &out->report},
+        {.name = "dft-header", .kind = option_text, .target = &out->dft_header},
         {.name = "method", .kind = option_text, .target = &out->method},
         {.name = "keep", .kind = option_text, .target = &out->keep},
         {.name = "grid", .kind = option_text, .target = &out->grid},

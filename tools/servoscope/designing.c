@@ -4,11 +4,16 @@
 #include "lab/design/report.h"
 #include "lab/page/page.h"
 #include "lab/record/atomic_file.h"
+#include "lab/record/manifest.h"
 #include "lab/record/table_file.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#ifndef SERVOSCOPE_VERSION
+#define SERVOSCOPE_VERSION "0.1.0"
+#endif
 
 int designing_table(const struct design_request *request, const struct design_result *result, struct table *out_table,
                     struct error *out_error)
@@ -52,17 +57,26 @@ int designing_write(const char *prefix, const struct design_request *request, co
     return status;
 }
 
-int designing_report(const char *path, const struct design_request *request, const struct design_result *result,
-                     struct error *out_error)
+int designing_report(const char *path, const char *prefix, const struct design_request *request,
+                     const struct design_result *result, struct error *out_error)
 {
+    const char *name = manifest_name_of(prefix);
+    const double rate_hz = (double)request->rate_numerator_hz / request->rate_denominator;
+    char title[192], subtitle[320];
     struct atomic_file file;
     struct page page;
     FILE *stream = atomic_file_open(&file, path, out_error);
     if (!stream) {
         return error_refused;
     }
-    page_start(&page, stream, "Excitation", NULL);
-    design_report_section(&page, request, result);
-    page_end(&page, NULL);
+    snprintf(title, sizeof title, "Excitation %s", name);
+    snprintf(subtitle, sizeof subtitle, "%s.mst: %zu lines, %.6g to %.6g Hz, %zu samples at %.6g Hz a period", name,
+             result->bin_count, rate_hz * result->bins[0] / (double)result->period_samples,
+             rate_hz * result->bins[result->bin_count - 1] / (double)result->period_samples, result->period_samples,
+             rate_hz);
+    page_start(&page, stream, title, subtitle);
+    design_report_sections(&page, request, result);
+    // A write error is kept by the stream, and commit reports it with the path and the reason.
+    (void)page_end(&page, "servoscope " SERVOSCOPE_VERSION);
     return atomic_file_commit(&file, out_error);
 }

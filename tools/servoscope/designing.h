@@ -17,9 +17,9 @@ int designing_table(const struct design_request *request, const struct design_re
 int designing_write(const char *prefix, const struct design_request *request, const struct design_result *result,
                     struct error *out_error);
 
-/// Writes a page with the design's report section alone.
+/// Writes the page of the design whose files begin with `prefix`.
 /// Errors: error_refused with the path and the reason; `path` is as it was then
-int designing_report(const char *path, const struct design_request *request, const struct design_result *result,
-                     struct error *out_error);
+int designing_report(const char *path, const char *prefix, const struct design_request *request,
+                     const struct design_result *result, struct error *out_error);
 
 #endif

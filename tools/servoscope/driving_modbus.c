@@ -5,24 +5,17 @@
 #include "lab/record/json_out.h"
 #include "ports/modbus_server.h"
 #include "ports/place.h"
+#include "ports/wall_clock.h"
 #include "sim/node/modbus_drive.h"
 #include "tools/servoscope/interrupt.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 /// A pause of the machine longer than this is not caught up with: the drive's time stands still meanwhile.
 static const double longest_catch_up_s = 0.5;
 static const double shortest_wait_s = 0.001;
-
-static double now_s(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
 
 /// The drive's samples up to now; what is left over waits for the next call.
 static void step_until(struct modbus_drive *drive, double now, double *io_sampled_s)
@@ -70,11 +63,11 @@ static int serve(const struct driving_request *request, struct modbus_drive *dri
                  struct error *out_error)
 {
     struct interrupt signals;
-    double started_s = now_s(), sampled_s = started_s;
+    double started_s = wall_clock_now_s(), sampled_s = started_s;
     bool there = true;
     interrupt_catch(&signals, false);
-    while (there && !*interrupt_flag() && !(request->for_s > 0.0 && now_s() - started_s >= request->for_s)) {
-        step_until(drive, now_s(), &sampled_s);
+    while (there && !*interrupt_flag() && !(request->for_s > 0.0 && wall_clock_now_s() - started_s >= request->for_s)) {
+        step_until(drive, wall_clock_now_s(), &sampled_s);
         there = modbus_server_run(server, shortest_wait_s);
     }
     interrupt_release(&signals);

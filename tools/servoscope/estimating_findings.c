@@ -365,11 +365,16 @@ static void say_agreement(const struct agreement *agreed, struct remarks *io_rem
         return;
     }
     if (agreement_differs(agreed)) {
-        remarks_add(io_remarks, remark_fact, "realisations",
-                    "the %zu realisations differ by %.3g times their noise (median; by chance less than %.1g): "
-                    "nonlinear distortion, or a drive that has changed between them, of %.1f dB of the response in "
-                    "each",
-                    agreed->realisations, agreed->ratio, fmax(agreed->chance, 1e-99), decibel(agreed->level));
+        char level[64] = "";
+        if (agreed->level > 0.0) {
+            snprintf(level, sizeof level, " of %.1f dB of the response in each", decibel(agreed->level));
+        }
+        remarks_add(
+            io_remarks, remark_fact, "realisations",
+            "the %zu realisations lie %.3g times as far apart as their noise explains (median of %zu lines; noise "
+            "alone would do that with a chance below %.1g): nonlinear distortion%s, or a drive that changed "
+            "between them",
+            agreed->realisations, agreed->ratio, agreed->lines, fmax(agreed->chance, 1e-99), level);
     } else {
         remarks_add(io_remarks, remark_fact, "realisations",
                     "the %zu realisations agree within their noise (as much scatter by chance: %.2g)",

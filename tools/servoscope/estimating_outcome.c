@@ -291,6 +291,46 @@ void estimating_outcome_print(const struct estimating_outcome *outcome, const st
     remarks_free(&remarks);
 }
 
+bool estimating_summary_make(const struct periodic *recording, struct estimating_summary *out_summary)
+{
+    *out_summary = (struct estimating_summary){
+        .period_samples = recording->period_samples,
+        .total = recording->total,
+        .settle = recording->settle,
+        .lost = recording->lost,
+        .first_lost_row = recording->first_lost_row,
+        .lost_outside = recording->lost_outside,
+        .first_lost_outside = recording->first_lost_outside,
+        .used = recording->used,
+        .period_found = recording->period_found,
+        .bins_found = recording->bins_found,
+        .doubtful = recording->doubtful_count,
+        .transient = recording->transient,
+        .first_level = periodic_first_level(recording),
+        .last_level = periodic_last_level(recording),
+    };
+    estimate_advise(recording, &out_summary->advice);
+    out_summary->levels = malloc(recording->total * sizeof *out_summary->levels);
+    if (out_summary->levels) {
+        memcpy(out_summary->levels, recording->output_level, recording->total * sizeof *out_summary->levels);
+    }
+    return out_summary->levels != NULL;
+}
+
+void estimating_summary_merge(struct estimating_summary *whole, const struct estimating_summary *one)
+{
+    struct estimating_summary before = *whole;
+    if (before.used_most == 0 || one->last_level > before.last_level) {
+        *whole = *one;
+        whole->findings = before.findings;
+        whole->excitations = before.excitations;
+    }
+    whole->used = before.used_most == 0 || one->used < before.used ? one->used : before.used;
+    whole->used_most = one->used > before.used_most ? one->used : before.used_most;
+    whole->lost = before.lost + one->lost;
+    whole->first_lost_row = before.lost > 0 ? before.first_lost_row : one->first_lost_row;
+}
+
 bool estimating_summary_excite(struct estimating_summary *io_summary, const struct periodic *recording)
 {
     struct excitation one;

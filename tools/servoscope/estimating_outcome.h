@@ -59,6 +59,12 @@ struct estimating_outcome {
     struct frf *responses;               ///< of each run, for the page; that of a single one is `frf`
 };
 
+/// What a recording says of itself. Errors: false if memory is short.
+bool estimating_summary_make(const struct periodic *recording, struct estimating_summary *out_summary);
+
+/// Adds a further segment of a sequence: the one that settled worst speaks for all.
+void estimating_summary_merge(struct estimating_summary *whole, const struct estimating_summary *one);
+
 /// Keeps what excited a recording, so that further runs can be compared with it. Errors: false if memory is short.
 bool estimating_summary_excite(struct estimating_summary *io_summary, const struct periodic *recording);
 

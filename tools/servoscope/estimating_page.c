@@ -6,6 +6,7 @@
 #include "lab/page/page.h"
 #include "tools/servoscope/estimating_model.h"
 
+#include <ctype.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -79,18 +80,9 @@ static bool make_grid(const struct parametric_model *model, const struct frf *li
     return true;
 }
 
-/// Half a sample: what holding the input between samples delays it by.
-static double hold_delay_s(const struct frf *frf)
-{
-    const double rate_hz = atof(estimate_key(frf, "sample_rate_hz"));
-    const bool held = strcmp(estimate_key(frf, "hold"), "zoh") == 0;
-    const bool removed = estimate_key(frf, "delay_removed_s")[0] != '\0';
-    return held && !removed && rate_hz > 0.0 ? 0.5 / rate_hz : 0.0;
-}
-
 /// Everything that the response's section is made of.
 struct section {
-    const char *names[frf_report_runs_max];
+    const char *names[option_values_max];
     char curve_name[name_size];
     struct grid grid;
     struct frf_model_curve curve;
@@ -100,15 +92,13 @@ struct section {
 static void take_runs(const struct estimating_page_item *item, struct section *io)
 {
     const size_t count = item->outcome->run_count;
-    if (count < 2) {
+    if (count < 2 || !item->outcome->responses) {
         return;
     }
     io->options.run_count = count;
     io->options.runs = item->outcome->responses;
     io->options.run_names = io->names;
-    for (size_t r = 0; r < count && r < frf_report_runs_max; r++) {
-        io->names[r] = file_name(item->sources->items[r]);
-    }
+    comparing_short_names(item->sources, io->names);
 }
 
 /// The model, which is kept with the first run.
@@ -135,14 +125,17 @@ static bool take_model(const struct estimating_page_item *item, struct section *
 static void add_response(const struct estimating_page_item *item, struct page *page)
 {
     const struct estimating_outcome *outcome = item->outcome;
-    struct section section = {.options = {.known_delay_s = hold_delay_s(&outcome->frf),
-                                          .delay_reason = "half a sample: the input is held between samples"}};
+    struct section section = {.options = {.name = file_name(item->out)}};
     const struct frf *shown = &outcome->frf;
     bool done = take_model(item, &section);
     if (done && section.options.curve_count > 0) {
         shown = &outcome->runs[0].measured;
-    } else {
-        take_runs(item, &section);
+    }
+    take_runs(item, &section);
+    if (item->compared) {
+        section.options.other_count = item->compared->count;
+        section.options.others = item->compared->responses;
+        section.options.other_names = item->compared->names;
     }
     if (done) {
         frf_report_section(page, shown, &section.options);
@@ -204,10 +197,30 @@ static void add_settling(const struct estimating_page_item *item, struct page *p
     free(numbers);
 }
 
+/// What the page is about in a box: which lines, how certain, whether the runs agree.
+static void add_result(const struct remarks *remarks, struct page *page)
+{
+    static const char *const ids[] = {"response", "uncertainty", "realisations"};
+    char text[1024] = "";
+    size_t used = 0;
+    for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
+        for (size_t r = 0; r < remarks->count; r++) {
+            const struct remark *one = &remarks->items[r];
+            if (one->level != remark_warning && strcmp(one->id, ids[i]) == 0 &&
+                used + strlen(one->text) + 4 < sizeof text) {
+                used += (size_t)snprintf(text + used, sizeof text - used, "%s%c%s.", used > 0 ? " " : "",
+                                         toupper((unsigned char)one->text[0]), one->text + 1);
+            }
+        }
+    }
+    page_add_note(page, page_plain, "Result", "%s", text);
+}
+
 static void add_item(const struct estimating_page_item *item, struct page *page)
 {
     struct remarks remarks = {.count = 0};
     estimating_outcome_say(item->outcome, item->sources, item->out, &remarks);
+    add_result(&remarks, page);
     remarks_add_warnings(&remarks, page);
     add_response(item, page);
     add_models(item, page);

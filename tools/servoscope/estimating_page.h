@@ -5,6 +5,7 @@
 
 #include "lab/record/atomic_file.h"
 #include "lab/record/error.h"
+#include "tools/servoscope/comparing.h"
 #include "tools/servoscope/estimating_outcome.h"
 #include "tools/servoscope/options.h"
 
@@ -15,6 +16,7 @@ struct estimating_page_item {
     const struct estimating_outcome *outcome;
     const struct option_values *sources;
     const char *out;
+    const struct comparing *compared; ///< saved responses to be drawn beside it; NULL: none
 };
 
 /// Writes one page with the sections of each response, beside its place: atomic_file_commit() puts it there.

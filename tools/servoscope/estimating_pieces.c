@@ -5,6 +5,7 @@
 #include "lab/estimate/frf_mean.h"
 #include "lab/estimate/method.h"
 #include "lab/estimate/online.h"
+#include "lab/numeric/cmplx.h"
 #include "tools/servoscope/interrupt.h"
 
 #include <complex.h>

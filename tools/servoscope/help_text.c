@@ -37,7 +37,7 @@ static size_t word_length(const struct help_line *line, size_t at)
 }
 
 /// Words with one blank between them; behind more blanks comes what the option does, or another option.
-size_t help_text_option_part(const struct help_line *line)
+static size_t option_part(const struct help_line *line)
 {
     size_t at = 2;
     if (line->length < 5 || line->text[0] != ' ' || line->text[1] != ' ' || !begins_option(line, 2)) {
@@ -93,10 +93,12 @@ static size_t add_option(const struct help_line *line, size_t at, size_t end, st
     return count;
 }
 
-size_t help_text_options(const struct help_line *line, struct help_option *io_options, size_t count)
+/// The options that a line is about (those it begins with, of a usage line all, and any in parentheses), added to
+/// io_options as far as there is room (help_options_max). Returns the new count. A name has one place.
+static size_t options_in(const struct help_line *line, struct help_option *io_options, size_t count)
 {
     const bool usage = line->length > 7 && memcmp(line->text, "usage: ", 7) == 0;
-    const size_t part = usage ? line->length : help_text_option_part(line);
+    const size_t part = usage ? line->length : option_part(line);
     for (size_t at = 1; at < line->length; at++) {
         /* "(--keep all)": an option told of where the one it belongs to is. */
         const bool named =
@@ -116,7 +118,7 @@ size_t help_text_all_options(const struct command *command, struct help_option o
     const char *at = NULL;
     size_t count = 0;
     while (help_text_next(command, &at, &line)) {
-        count = help_text_options(&line, out_options, count);
+        count = options_in(&line, out_options, count);
     }
     for (size_t i = 0; i < shared_count; i++) {
         if (count < help_options_max && !is_known(out_options, count, shared[i])) {

@@ -24,14 +24,7 @@ struct help_line {
 /// Takes the next line of a help text, `more_help` behind `help`; false at the end. *io_at begins with NULL.
 bool help_text_next(const struct command *command, const char **io_at, struct help_line *out_line);
 
-/// The options that a line is about (those it begins with, of a usage line all, and any in parentheses), added to
-/// io_options as far as there is room (help_options_max). Returns the new count. A name has one place.
-size_t help_text_options(const struct help_line *line, struct help_option *io_options, size_t count);
-
 /// All options of a subcommand, those that main takes for each of them last. Returns how many.
 size_t help_text_all_options(const struct command *command, struct help_option out_options[help_options_max]);
-
-/// Length of the part of an option's line that names options and values: what they do begins behind it.
-size_t help_text_option_part(const struct help_line *line);
 
 #endif

@@ -125,7 +125,7 @@ static double missed_squares(const struct sim_model *model, const struct run *ru
         sim_actuator_hold(&actuator, torque_ref[n]);
         const double misplaced = torque[n] - sim_actuator_now(&actuator, &stepper);
         for (size_t i = 0; i < sim_substeps; i++) {
-            sim_plant_move(&plant, &stepper, sim_actuator_substep(&actuator, &stepper, i));
+            sim_plant_drive(&plant, &stepper, &actuator, i, 0.0);
         }
         const double missed = moved * run->sample_rate_hz * (velocity[n + 1] - plant.velocity);
         sum += n >= first ? missed * missed + misplaced * misplaced : 0.0;

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "tools/servoscope/interrupt.h"
 
+#include "ports/wall_clock.h"
+
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 static const double first_shown_s = 1.0;
 static const double renewed_s = 0.2;
@@ -46,29 +47,22 @@ const volatile sig_atomic_t *interrupt_flag(void)
     return &stop_requested;
 }
 
-static double now_s(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
 void terminal_line_start(struct terminal_line *self, const struct command_context *context)
 {
     *self = (struct terminal_line){
         .wanted = context->terminal && !context->quiet && !context->json,
-        .started_s = now_s(),
+        .started_s = wall_clock_now_s(),
     };
 }
 
 double terminal_line_elapsed_s(const struct terminal_line *self)
 {
-    return now_s() - self->started_s;
+    return wall_clock_now_s() - self->started_s;
 }
 
 bool terminal_line_due(struct terminal_line *self)
 {
-    double now = now_s();
+    double now = wall_clock_now_s();
     if (!self->wanted || now - self->started_s < first_shown_s || now - self->shown_s < renewed_s) {
         return false;
     }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /// The program: finds the subcommand, takes out what all of them share, prints what went wrong, once.
 #include "tools/servoscope/command.h"
+#include "tools/servoscope/suggest.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -83,11 +84,39 @@ static int run_command(const struct command *command, int argc, char **argv)
     return finish_output(command->name, status);
 }
 
+static int refuse_unknown(const char *word)
+{
+    struct suggestion suggestion;
+    suggest_begin(&suggestion, word + strspn(word, "-"), strlen(word + strspn(word, "-")));
+    for (size_t i = 0; commands[i]; i++) {
+        suggest_consider(&suggestion, commands[i]->name);
+    }
+    const char *meant = suggest_found(&suggestion);
+    fprintf(stderr, "servoscope: '%s' is not a subcommand%s%s%s 'servoscope --help' lists them\n", word,
+            meant ? ": did you mean " : ";", meant ? meant : "", meant ? "?" : "");
+    return error_usage;
+}
+
+/// `servoscope help [SUBCOMMAND]`, as many programs have it, is turned into `servoscope [SUBCOMMAND] --help`.
+static void turn_help_round(int argc, char **argv)
+{
+    static char help[] = "--help";
+    if (argc == 2) {
+        argv[1] = help;
+    } else if (argc == 3) {
+        argv[1] = argv[2];
+        argv[2] = help;
+    }
+}
+
 int main(int argc, char **argv)
 {
     if (argc < 2) {
         print_list(stderr);
         return error_usage;
+    }
+    if (strcmp(argv[1], "help") == 0) {
+        turn_help_round(argc, argv);
     }
     if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0) {
         print_list(stdout);
@@ -99,8 +128,7 @@ int main(int argc, char **argv)
     }
     const struct command *command = find_command(argv[1]);
     if (!command) {
-        fprintf(stderr, "servoscope: '%s' is not a subcommand; 'servoscope --help' lists them\n", argv[1]);
-        return error_usage;
+        return refuse_unknown(argv[1]);
     }
     return run_command(command, argc - 1, argv + 1);
 }

@@ -142,7 +142,11 @@ void measured_print(const struct measured *self)
     }
 }
 
-static bool set_text(struct run *run, const char *key, const char *format, ...)
+#if defined(__GNUC__)
+__attribute__((format(printf, 3, 4)))
+#endif
+static bool
+set_text(struct run *run, const char *key, const char *format, ...)
 {
     char text[200];
     va_list values;

@@ -3,6 +3,7 @@
 
 #include "lab/record/json_out.h"
 #include "lab/record/manifest.h"
+#include "ports/wall_clock.h"
 #include "tools/servoscope/interrupt.h"
 #include "tools/servoscope/measured.h"
 #include "tools/servoscope/measured_page.h"
@@ -135,11 +136,11 @@ int measuring_run(struct measuring *self, const struct drive *drive, const char 
     struct interrupt signals;
     struct measure_report report;
     struct run run;
-    const double started_s = measuring_live_now_s();
+    const double started_s = wall_clock_now_s();
     measuring_live_start(&live, context, started_s, NULL, &self->plan);
     interrupt_catch(&signals, false);
     int status = measure_run(drive, &self->plan, &run, &report, out_error);
-    double rate_per_s = (double)report.rows / (measuring_live_now_s() - started_s + 1e-9);
+    double rate_per_s = (double)report.rows / (wall_clock_now_s() - started_s + 1e-9);
     measuring_live_stop(&live);
     if (run.rows > 0) {
         const struct measured measured = {self->request->out, source, &run, &report, rate_per_s, self->door};

@@ -4,6 +4,7 @@
 
 #include "lab/measure/amplitudes.h"
 #include "lab/measure/table_value.h"
+#include "ports/wall_clock.h"
 
 #include <errno.h>
 #include <math.h>
@@ -27,13 +28,6 @@ struct screen {
     size_t count;
     char line[measuring_live_lines_max][measuring_live_width_max];
 };
-
-double measuring_live_now_s(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
 
 #if defined(__GNUC__)
 __attribute__((format(printf, 2, 3)))
@@ -71,7 +65,7 @@ static void add_progress(const struct measuring_live *self, struct screen *io_sc
     const double total_here = (double)atomic_load_explicit(&self->feed.total, memory_order_relaxed);
     const double done = (double)place->samples_before + here;
     const double total = fmax(place->samples_planned > 0 ? (double)place->samples_planned : total_here, done);
-    const double elapsed_s = measuring_live_now_s() - self->started_s;
+    const double elapsed_s = wall_clock_now_s() - self->started_s;
     const double rate = done / elapsed_s;
     char bar[bar_width + 1], segment[64] = "", left[32] = "";
     draw_bar(total > 0.0 ? done / total : 0.0, bar);
@@ -304,10 +298,10 @@ static void *show(void *object)
     if (nice(below_the_loop) == -1) {
         errno = 0;
     }
-    double next_s = fmax(self->started_s + first_shown_s, measuring_live_now_s());
+    double next_s = fmax(self->started_s + first_shown_s, wall_clock_now_s());
     while (!wait_until(self, next_s)) {
         draw(self);
-        next_s = measuring_live_now_s() + renewed_s;
+        next_s = wall_clock_now_s() + renewed_s;
     }
     erase(self);
     return NULL;

@@ -44,15 +44,12 @@ struct measuring_live {
 
 /// Starts the view if standard error is a terminal and neither --quiet nor --json was given, and has *io_plan tell it
 /// of each sample; does nothing else, also where memory or threads are short. It shows itself from a second after
-/// `started_s` on, twice a second. TERM=dumb, or a window of fewer lines, gets one line.
+/// `started_s` (wall_clock_now_s) on, twice a second. TERM=dumb, or a window of fewer lines, gets one line.
 /// Lifetime: *io_plan and its table must outlive the view; *out_self must not move
 void measuring_live_start(struct measuring_live *out_self, const struct command_context *context, double started_s,
                           const struct measuring_live_place *place, struct measure_plan *io_plan);
 
 /// Ends the thread and takes the lines off the screen; harmless if it was not started.
 void measuring_live_stop(struct measuring_live *self);
-
-/// Seconds of the clock that started_s is of.
-double measuring_live_now_s(void);
 
 #endif

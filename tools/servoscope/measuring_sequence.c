@@ -4,6 +4,7 @@
 #include "lab/record/json_out.h"
 #include "lab/record/manifest.h"
 #include "lab/record/run_sequence.h"
+#include "ports/wall_clock.h"
 #include "tools/servoscope/interrupt.h"
 #include "tools/servoscope/measured.h"
 #include "tools/servoscope/measured_page.h"
@@ -334,9 +335,9 @@ static int play_segment(struct playing *self, size_t segment, struct error *out_
                                                self->samples_planned};
     shift_limits(&plan, self->position_rad);
     measuring_live_start(&live, self->context, self->started_s, &place, &plan);
-    const double begun_s = measuring_live_now_s();
+    const double begun_s = wall_clock_now_s();
     status = measure_run(self->drive, &plan, &run, &self->report, out_error);
-    const double took_s = measuring_live_now_s() - begun_s + 1e-9;
+    const double took_s = wall_clock_now_s() - begun_s + 1e-9;
     measuring_live_stop(&live);
     self->position_rad += self->report.end_position_rad;
     self->samples_before += self->report.rows_planned;
@@ -407,7 +408,7 @@ static int print_json(struct playing *self, struct error *out_error)
     cJSON_AddNumberToObject(object, "rows", (double)self->rows);
     cJSON_AddNumberToObject(object, "rows_planned", (double)self->samples_planned);
     cJSON_AddNumberToObject(object, "samples_lost", (double)self->rows_lost);
-    cJSON_AddNumberToObject(object, "samples_per_s", (double)self->rows / (measuring_live_now_s() - self->started_s));
+    cJSON_AddNumberToObject(object, "samples_per_s", (double)self->rows / (wall_clock_now_s() - self->started_s));
     if (self->measuring->door) {
         measured_add_bus(self->measuring->door, object);
     }
@@ -462,7 +463,7 @@ int measuring_sequence_run(struct measuring *self, const struct drive *drive, co
 {
     struct playing playing = {.measuring = self, .drive = drive, .source = source, .context = context};
     struct interrupt signals;
-    playing.started_s = measuring_live_now_s();
+    playing.started_s = wall_clock_now_s();
     playing.said = cJSON_CreateArray();
     int status = plan_runs(&playing, out_error);
     status = status ? status : prepare_page(&playing, out_error);

@@ -5,6 +5,7 @@
 #include "drivers/modbus/host.h"
 #include "ports/modbus_host.h"
 #include "ports/place.h"
+#include "ports/wall_clock.h"
 #include "tools/servoscope/interrupt.h"
 #include "tools/servoscope/modbus_response.h"
 
@@ -12,7 +13,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 static const char tcp_prefix[] = "modbus-tcp:", rtu_prefix[] = "modbus-rtu:";
@@ -40,13 +40,6 @@ struct job {
 bool modbus_measuring_is(const char *url)
 {
     return strncmp(url, tcp_prefix, sizeof tcp_prefix - 1) == 0 || strncmp(url, rtu_prefix, sizeof rtu_prefix - 1) == 0;
-}
-
-static double now_s(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
 // ---- Connection
@@ -102,7 +95,7 @@ static int connect_drive(struct job *self, const char *url, struct error *out_er
     }
     self->link = modbus_port_link(self->port);
     enum modbus_host_status opened =
-        modbus_host_open(&self->host, &self->link, (uint16_t)((unsigned)getpid() * 31u + (unsigned)now_s()));
+        modbus_host_open(&self->host, &self->link, (uint16_t)((unsigned)getpid() * 31u + (unsigned)wall_clock_now_s()));
     if (opened != modbus_host_ok) {
         return refuse(self, opened, out_error);
     }
@@ -212,6 +205,10 @@ static int set_up(struct job *self, struct error *out_error)
         return error_set(out_error, error_refused, "stopped early: interrupted by the user before anything was played");
     }
     got = got == modbus_host_ok ? modbus_host_command(&self->host, modbus_command_arm) : got;
+    if (*interrupt_flag()) {
+        modbus_host_command(&self->host, modbus_command_stop);
+        return error_set(out_error, error_refused, "stopped early: interrupted by the user before anything was played");
+    }
     got = got == modbus_host_ok ? modbus_host_command(&self->host, modbus_command_start) : got;
     return got == modbus_host_ok ? 0 : refuse(self, got, out_error);
 }
@@ -266,7 +263,7 @@ static int follow(struct job *self, struct error *out_error)
     double samples = ((double)plan->settle_periods + plan->periods) * plan->table->period_samples +
                      2.0 * measure_ramp_samples(plan->table, plan->mode) + 2.0 * plan->fade_samples;
     double longest_s = 1.5 * (samples / rate_hz(plan->table) + measure_dwell_s) + patience_s;
-    double started_s = now_s();
+    double started_s = wall_clock_now_s();
     do {
         enum modbus_host_status got = modbus_host_read_state(&self->host, &self->state);
         if (got == modbus_host_ok && *interrupt_flag() && !self->interrupted) {
@@ -281,7 +278,7 @@ static int follow(struct job *self, struct error *out_error)
         if (!is_over(self->state.state)) {
             self->link.wait(self->link.self, poll_ms);
         }
-    } while (!is_over(self->state.state) && now_s() - started_s < longest_s);
+    } while (!is_over(self->state.state) && wall_clock_now_s() - started_s < longest_s);
     if (!is_over(self->state.state)) {
         return error_set(out_error, error_refused, "--drive: after %.0f s the drive is still %s", longest_s,
                          modbus_state_str(self->state.state));
@@ -318,6 +315,42 @@ static int check_end(const struct job *self, struct error *out_error)
                      self->interrupted ? "interrupted by the user" : "stopped by another command");
 }
 
+/// Follows the run to its end and reads the means. A drive that is still moving when this fails is told to stop; if it
+/// does not hear that, it finds out by itself host_timeout_ms later.
+static int play(struct job *self, struct error *out_error)
+{
+    int status = follow(self, out_error);
+    if (status && !is_over(self->state.state)) {
+        modbus_host_command(&self->host, modbus_command_stop);
+    }
+    status = status ? status : read_means(self, out_error);
+    terminal_line_clear(&self->line);
+    return status ? status : check_end(self, out_error);
+}
+
+/// Writes what was read, of a run that ended early or whose connection was lost too: `early` says why.
+static int keep(struct job *self, const char *url, const struct error *early, const struct command_context *context,
+                struct error *out_error)
+{
+    const struct modbus_response_facts facts = {
+        .out = self->request->out,
+        .drive = url,
+        .stopped_by = early->status ? early->message : NULL,
+        .torque_clipped = self->state.torque_clipped,
+        .requests = self->host.count.requests,
+        .repeated = self->host.count.repeated,
+        .stale = self->host.count.stale,
+    };
+    if (early->status && self->response.periods < 2) {
+        return error_set(out_error, early->status, "%s", early->message);
+    }
+    int status = modbus_response_write(&self->response, &facts, context, out_error);
+    return status          ? status
+           : early->status ? error_set(out_error, early->status, "%s; the response of %zu periods until then is kept",
+                                       early->message, self->response.periods)
+                           : 0;
+}
+
 static int measure(struct job *self, const char *url, const struct command_context *context, struct error *out_error)
 {
     int status = connect_drive(self, url, out_error);
@@ -329,31 +362,12 @@ static int measure(struct job *self, const char *url, const struct command_conte
         return error_set(out_error, error_refused, "memory is short");
     }
     status = set_up(self, out_error);
-    status = status ? status : follow(self, out_error);
-    if (status && !is_over(self->state.state)) {
-        modbus_host_command(&self->host,
-                            modbus_command_stop); // else the drive finds out by itself, host_timeout_ms later
-    }
-    status = status ? status : read_means(self, out_error);
-    terminal_line_clear(&self->line);
     if (status) {
         return status;
     }
     struct error early = {0, ""};
-    int ended = check_end(self, &early);
-    struct modbus_response_facts facts = {
-        .out = self->request->out,
-        .drive = url,
-        .stopped_by = ended ? early.message : NULL,
-        .torque_clipped = self->state.torque_clipped,
-        .requests = self->host.count.requests,
-        .repeated = self->host.count.repeated,
-        .stale = self->host.count.stale,
-    };
-    if (!ended || self->response.periods >= 2) {
-        status = modbus_response_write(&self->response, &facts, context, out_error);
-    }
-    return status ? status : ended ? error_set(out_error, ended, "%s", early.message) : 0;
+    play(self, &early);
+    return keep(self, url, &early, context, out_error);
 }
 
 int modbus_measuring_run(const struct measuring_request *request, const char *url,

@@ -2,6 +2,7 @@
 #include "tools/servoscope/options.h"
 
 #include "lab/record/number.h"
+#include "tools/servoscope/suggest.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -101,6 +102,28 @@ static const struct option *find_option(const struct option *options, size_t opt
     return NULL;
 }
 
+/// Refuses a word that is no option, with the one that may have been meant.
+static int refuse_unknown(const char *word, const struct option *options, size_t option_count, const char *command,
+                          struct error *out_error)
+{
+    const char *name = word + strspn(word, "-");
+    struct suggestion suggestion;
+    suggest_begin(&suggestion, name, strcspn(name, "="));
+    for (size_t i = 0; i < option_count; i++) {
+        suggest_consider(&suggestion, options[i].name);
+    }
+    static const char *const shared[] = {"json", "quiet", "help"};
+    for (size_t i = 0; i < sizeof shared / sizeof shared[0]; i++) {
+        suggest_consider(&suggestion, shared[i]);
+    }
+    const char *meant = suggest_found(&suggestion);
+    if (meant) {
+        return error_set(out_error, error_usage, "unknown option '%s': did you mean --%s? See 'servoscope %s --help'",
+                         word, meant, command);
+    }
+    return error_set(out_error, error_usage, "unknown option '%s'; see 'servoscope %s --help'", word, command);
+}
+
 static bool is_option_word(const char *word)
 {
     return word[0] == '-' && word[1] == '-';
@@ -135,9 +158,6 @@ static int read_option(const struct option *option, int argc, char **argv, int a
 static int take_operand(const char *word, const struct option_operands *operands, const char *command,
                         struct error *out_error)
 {
-    if (word[0] == '-' && word[1] != '\0') {
-        return error_set(out_error, error_usage, "unknown option '%s'; see 'servoscope %s --help'", word, command);
-    }
     if (!operands || operands->values->count >= operands->at_most) {
         return error_set(out_error, error_usage, "unexpected '%s'; see 'servoscope %s --help'", word, command);
     }
@@ -166,7 +186,7 @@ static int read_option_word(int argc, char **argv, int at, const struct option *
     const char *name = argv[at] + 2;
     const struct option *option = find_option(options, option_count, name, strcspn(name, "="));
     if (!option) {
-        return error_set(out_error, error_usage, "unknown option '%s'; see 'servoscope %s --help'", argv[at], argv[0]);
+        return refuse_unknown(argv[at], options, option_count, argv[0], out_error);
     }
     bool *seen = &given[option - options];
     if (*seen && option->kind != option_list) {
@@ -195,6 +215,8 @@ int options_parse(int argc, char **argv, const struct option *options, size_t op
         int next = at + 1;
         if (options_ended && operands && operands->values->count < operands->at_most) {
             status = append_value(operands->values, operands->name, argv[at], out_error);
+        } else if (!options_ended && argv[at][0] == '-' && argv[at][1] != '\0' && !is_option_word(argv[at])) {
+            status = refuse_unknown(argv[at], options, option_count, argv[0], out_error);
         } else if (options_ended || !is_option_word(argv[at])) {
             status = take_operand(argv[at], operands, argv[0], out_error);
         } else if (argv[at][2] == '\0') {

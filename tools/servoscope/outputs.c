@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: MIT */
+#define _XOPEN_SOURCE 700 /* mkstemp */
 #include "tools/servoscope/outputs.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -29,11 +32,52 @@ static bool is_among(const char *path, const char *const *others, size_t count)
     return false;
 }
 
+enum { probe_bytes = 1 << 16 };
+
+/// A device that is no terminal takes a line end, or it takes nothing: /dev/full.
+static int check_device(const char *path, struct error *out_error)
+{
+    const int file = open(path, O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    int reason = file < 0 ? errno : 0;
+    if (file >= 0 && !isatty(file) && write(file, "\n", 1) != 1) {
+        reason = errno;
+    }
+    if (file >= 0) {
+        close(file);
+    }
+    return reason ? error_set(out_error, error_refused, "%s: cannot be written: %s", path, strerror(reason)) : 0;
+}
+
+/// Whether the folder's disk takes a file of some size: it may be full, or a quota used up. Leaves nothing behind.
+static int probe_folder(const char *path, const char *folder, struct error *out_error)
+{
+    static const char nothing[probe_bytes];
+    const size_t size = strlen(folder) + 32;
+    char *name = malloc(size);
+    if (!name) {
+        return error_set(out_error, error_refused, "memory is short");
+    }
+    snprintf(name, size, "%s/.servoscope-XXXXXX", folder);
+    const int file = mkstemp(name);
+    int reason = file < 0 ? errno : 0;
+    if (file >= 0) {
+        const ssize_t written = write(file, nothing, sizeof nothing);
+        reason = written < 0 ? errno : written < probe_bytes ? ENOSPC : 0;
+        close(file);
+        unlink(name);
+    }
+    free(name);
+    return reason ? error_set(out_error, error_refused, "%s: cannot be written: %s", path, strerror(reason)) : 0;
+}
+
 static int check_folder(const char *path, struct error *out_error)
 {
     struct stat file;
     if (stat(path, &file) == 0 && S_ISDIR(file.st_mode)) {
         return error_set(out_error, error_refused, "%s: is a folder, a file name was expected", path);
+    }
+    if (stat(path, &file) == 0 && !S_ISREG(file.st_mode)) {
+        return S_ISCHR(file.st_mode) ? check_device(path, out_error) : 0;
     }
     const char *slash = strrchr(path, '/');
     size_t length = slash ? (size_t)(slash - path) : 0;
@@ -46,6 +90,8 @@ static int check_folder(const char *path, struct error *out_error)
     int status = 0;
     if (access(folder, W_OK) != 0) {
         status = error_set(out_error, error_refused, "%s: cannot be written: %s: %s", path, folder, strerror(errno));
+    } else {
+        status = probe_folder(path, folder, out_error);
     }
     free(folder);
     return status;

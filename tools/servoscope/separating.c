@@ -39,6 +39,7 @@ static int check_options(const struct design_options *options, struct error *out
                          "model it wrote");
     const char *refused = options->predict                 ? "predict"
                           : options->report                ? "report"
+                          : options->dft_header            ? "dft-header"
                           : options->minimum_effective > 0 ? "minimum-effective"
                           : options->inputs > 1            ? "inputs"
                                                            : NULL;

@@ -17,6 +17,10 @@
 #include <string.h>
 #include <unistd.h>
 
+#ifndef SERVOSCOPE_VERSION
+#define SERVOSCOPE_VERSION "0.1.0"
+#endif
+
 enum { report_tables_max = 64 }; ///< a page of more is too much for a browser
 
 /// A sequence while it is designed.
@@ -240,7 +244,9 @@ static int design_table(struct work *self, size_t segment, size_t input, struct 
             cJSON_AddItemToArray(self->summary->segments, describe_table(self, segment, input, &request, &result));
         }
         if (!status && self->paged) {
-            design_report_section(&self->page, &request, &result);
+            char heading[160];
+            snprintf(heading, sizeof heading, "%s", manifest_name_of(table_path(self, segment, input, ".mst")));
+            design_report_section(&self->page, heading, &request, &result);
         }
         design_result_free(&result);
     }
@@ -287,6 +293,20 @@ static int write_manifest(struct work *self, struct error *out_error)
     return sequence_file_write(manifest_path(self), manifest, out_error);
 }
 
+static void start_page(struct work *self, FILE *stream)
+{
+    const struct sequences_summary *summary = self->summary;
+    const struct design_sequence *sequence = &summary->sequence;
+    char title[192], subtitle[320];
+    snprintf(title, sizeof title, "Excitations %s", manifest_name_of(manifest_path(self)));
+    snprintf(subtitle, sizeof subtitle,
+             "%s: %zu segments, %zu tables of %zu samples at %.6g Hz, %zu lines, measuring takes %.4g s",
+             design_sequence_kind_str(sequence->kind), sequence->segment_count,
+             sequence->segment_count * sequence->inputs, sequence->period_samples, sequence->rate_hz,
+             summary->line_count, summary->test_time_s);
+    page_start(&self->page, stream, title, subtitle);
+}
+
 static int design_all(struct work *self, struct error *out_error)
 {
     struct atomic_file file = {0};
@@ -295,7 +315,7 @@ static int design_all(struct work *self, struct error *out_error)
         if (!stream) {
             return error_refused;
         }
-        page_start(&self->page, stream, "Sequence of excitations", NULL);
+        start_page(self, stream);
         self->paged = true;
     }
     // Until all tables are new, a manifest of old ones would name a mixture.
@@ -312,7 +332,8 @@ static int design_all(struct work *self, struct error *out_error)
         atomic_file_discard(&file);
         return status;
     }
-    page_end(&self->page, NULL);
+    // A write error is kept by the stream, and commit reports it with the path and the reason.
+    (void)page_end(&self->page, "servoscope " SERVOSCOPE_VERSION);
     return atomic_file_commit(&file, out_error);
 }
 
