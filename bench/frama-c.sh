@@ -17,17 +17,19 @@ declare -A sources=(
     [table]='lib/msgen/table.c lib/core/crc32.c'
     [player]='lib/msgen/player.c lib/msgen/table.c lib/core/crc32.c'
     [dft]='lib/frf/dft.c lib/frf/dft_q15.c lib/frf/dft_q31.c lib/frf/dft_i16.c lib/frf/dft_by_twos.c'
+    [twiddle]='lib/frf/dft.c lib/frf/dft_i16.c lib/frf/dft_i24.c lib/frf/dft_q23.c lib/frf/dft_quarter_q*.c lib/frf/dft_two_level_q*.c'
     [block]='lib/frf/block.c lib/frf/block_kernel.c'
 )
 # Loops of the numeric drivers are followed one by one; what a sample's value decides (rails, marks) is joined where it is decided,
 # or every sample would double what has to be followed. The guard's driver has any number of samples, joined.
 declare -A options=(
     [dft]='-eva-slevel 300 -eva-slevel-function frf_dft_add_i16:0,frf_dft_mark:0 -eva-min-loop-unroll 70'
+    [twiddle]='-eva-slevel 300 -eva-slevel-function frf_dft_add_i16:0,look_at:0,frf_dft_mark:0 -eva-min-loop-unroll 70'
     [block]='-eva-slevel 50 -eva-min-loop-unroll 40
         -eva-slevel-function count_saturated:0,frf_block_mark:0,frf_block_skip:0,frf_block_add_i16:0'
     [table]='-eva-slevel 1000 -eva-slevel-function main:3000,open_all:3000,open:0,core_crc32:0 -eva-auto-loop-unroll 7'
 )
-[ $# -gt 0 ] || set -- crc guard table player dft block
+[ $# -gt 0 ] || set -- crc guard table player dft twiddle block
 status=0
 for driver in "$@"; do
     read -ra files < <(eval "echo ${sources[$driver]}")

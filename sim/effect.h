@@ -132,8 +132,10 @@ struct sim_effect {
 
     /// Adds what the effect contributes to the torque against the motor at one instant.
     void (*oppose)(const double *parameters, const struct sim_motion *motion, struct sim_opposing *io_opposing);
-    /// Dry friction does not switch but builds up: the distance over which it comes within 1/e of its level.
-    double (*build_up)(const double *parameters);
+    /// Dry friction does not switch but builds up: what is missing of its level, over that level, falls per distance
+    /// returned by its own power of the exponent. With 1 it comes within 1/e over that distance; below 1 there is an
+    /// end to it.
+    double (*build_up)(const double *parameters, double *out_exponent);
     /// Changes the belt at one instant. Called in the order of sim_effects, which is that of the names: backlash takes
     /// its part of the twist before a spring that hardens sees it.
     void (*bend)(const double *parameters, const struct sim_motion *motion, struct sim_belt *io_belt);

@@ -124,15 +124,29 @@ struct course {
     double bristle, level;
 };
 
-/// Friction that builds up, dF/dx = (level - F) / distance, its level straight from where the step began to here: what
-/// was missing fades with the way, whatever the speed.
+/// Share that is left, after a way in distances, of what was missing: dr/dx = -r^n of r times the level. With n below 1
+/// it comes to an end.
+static double left_missing(double missing, double way, double exponent)
+{
+    const double same = 1e-6;
+    if (fabs(exponent - 1.0) < same)
+        return exp(-way);
+    if (!(missing > 0.0 && isfinite(missing)))
+        return 0.0;
+    double power = 1.0 - exponent, left = pow(missing, power) - power * way;
+    return left > 0.0 ? pow(left, 1.0 / power) / missing : 0.0;
+}
+
+/// Friction that builds up, its level straight from where the step began to here: what was missing fades with the way,
+/// whatever the speed.
 static double built_up(const struct course *course, double position, double dry)
 {
     double way = fabs(position - course->from) / course->stepper->build_up, level = course->direction * dry;
     if (!(way > 0.0))
         return course->bristle;
-    double faded = -expm1(-way);
-    return level - (level - course->level) * faded / way + (course->bristle - course->level) * (1.0 - faded);
+    double faded = -expm1(-way), missing = course->bristle - course->level;
+    double left = left_missing(fabs(missing) / dry, way, course->stepper->build_up_exponent);
+    return level - (level - course->level) * faded / way + missing * left;
 }
 
 static double motor_acceleration(const struct state *s, const struct course *course, double link)
@@ -355,14 +369,22 @@ static bool hangs_loose(const struct state *s, const struct sim_stepper *stepper
     return belt.twist == 0.0 && belt.twist_rate == 0.0;
 }
 
-/// A step during which a belt may go slack or tight: near that instant in shorter steps.
+/// Side of a gap in the belt on which it pulls; 0 where it hangs loose, and where it has no gap.
+static int pulled_side(const struct state *s, const struct sim_stepper *stepper)
+{
+    struct sim_belt belt = belt_of(s, stepper);
+    double taken = s->position[0] - s->position[1] - belt.twist;
+    return belt.twist == 0.0 && belt.twist_rate == 0.0 ? 0 : sign_of(taken);
+}
+
+/// A step during which a belt may go slack, tight, or through its gap: near that instant in shorter steps.
 static void step_belt(struct state *io, const struct sim_stepper *stepper, double torque, double dt_s)
 {
     enum { parts = 16 };
     struct state next = *io;
-    bool loose = hangs_loose(io, stepper);
+    int side = pulled_side(io, stepper);
     step_with_reversal(&next, stepper, torque, dt_s);
-    if (loose == hangs_loose(&next, stepper)) {
+    if (side == pulled_side(&next, stepper)) {
         *io = next;
         return;
     }

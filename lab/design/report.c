@@ -2,6 +2,7 @@
 #include "lab/design/report.h"
 
 #include "lab/design/intermodulation.h"
+#include "lab/design/report_rows.h"
 #include "lab/design/start.h"
 #include "lab/numeric/statistics.h"
 
@@ -10,52 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double two_pi = 6.283185307179586;
-
-/// One quantity of the design in every form that the report needs.
-struct row {
-    const char *name, *unit;
-    const double *series;
-    double limit; ///< 0: none
-    double peak, peak_continuous;
-};
-
-enum { row_torque, row_velocity, row_position, row_acceleration, row_count };
-
-static void make_rows(const struct design_request *request, const struct design_result *result,
-                      struct row rows[row_count])
-{
-    const bool linear = request->linear;
-    const struct design_limits *limits = &request->limits;
-    const struct design_peaks *at = &result->peak;
-    const struct design_peaks *between = &result->peak_continuous;
-    rows[row_torque] = (struct row){
-        linear ? "force" : "torque", linear ? "N" : "Nm", result->torque_Nm,
-        limits->torque_Nm,           at->torque_Nm,       between->torque_Nm,
-    };
-    rows[row_velocity] = (struct row){
-        "velocity",
-        linear ? "m/s" : "rad/s",
-        result->velocity_rad_per_s,
-        limits->velocity_rad_per_s,
-        at->velocity_rad_per_s,
-        between->velocity_rad_per_s,
-    };
-    rows[row_position] = (struct row){
-        "position",           linear ? "m" : "rad", result->position_rad,
-        limits->position_rad, at->position_rad,     between->position_rad,
-    };
-    rows[row_acceleration] = (struct row){
-        "acceleration",
-        linear ? "m/s²" : "rad/s²",
-        result->acceleration_rad_per_s2,
-        limits->acceleration_rad_per_s2,
-        at->acceleration_rad_per_s2,
-        between->acceleration_rad_per_s2,
-    };
-}
-
-static void add_panel(struct figure *figure, const struct row *row, size_t count, const double *time_s,
+static void add_panel(struct figure *figure, const struct report_row *row, size_t count, const double *time_s,
                       const double *series)
 {
     char label[figure_text_max];
@@ -86,9 +42,9 @@ static const char *start_reason(enum design_start start)
     return "";
 }
 
-/// One period in the order of playing, closed by its first sample: `values` holds (row_count + 1) x (N + 1) numbers.
+/// One period in the order of playing, closed by its first sample: `values` holds (report_rows + 1) x (N + 1) numbers.
 static void add_period(struct page *page, const struct design_request *request, const struct design_result *result,
-                       const struct row *rows, double *values)
+                       const struct report_row *rows, double *values)
 {
     const double step_s = (double)request->rate_denominator / request->rate_numerator_hz;
     const size_t period = result->period_samples;
@@ -97,13 +53,13 @@ static void add_period(struct page *page, const struct design_request *request, 
     figure_start(&figure, "time in s", axis_linear);
     for (size_t n = 0; n < points; n++) {
         values[n] = step_s * (double)n;
-        for (size_t i = 0; i < row_count; i++) {
+        for (size_t i = 0; i < report_rows; i++) {
             values[(i + 1) * points + n] = rows[i].series[(result->start_index + n) % period];
         }
     }
-    for (size_t i = 0; i < row_count; i++) {
+    for (size_t i = 0; i < report_rows; i++) {
         // Acceleration is torque over inertia: its panel says nothing new unless it has a limit of its own.
-        if (i != row_acceleration || rows[i].limit > 0) {
+        if (i != report_acceleration || rows[i].limit > 0) {
             add_panel(&figure, &rows[i], points, values, values + (i + 1) * points);
         }
     }
@@ -112,54 +68,40 @@ static void add_period(struct page *page, const struct design_request *request, 
 }
 
 static void add_spectrum(struct page *page, const struct design_request *request, const struct design_result *result,
-                         double line_hz, const struct row *rows, double *values)
+                         const struct report_row *rows, double *values)
 {
     const size_t count = result->bin_count;
     double *frequency_hz = values, *velocity = values + count, *torque = values + 2 * count;
-    for (size_t k = 0; k < count; k++) {
-        const double omega = two_pi * line_hz * result->bins[k];
-        frequency_hz[k] = line_hz * result->bins[k];
-        velocity[k] = omega * result->amplitude_rad[k];
-        torque[k] = request->inertia_kgm2 * omega * omega * result->amplitude_rad[k];
-    }
+    report_rows_amplitudes(request, result, frequency_hz, torque, velocity);
     struct figure figure;
     char label[figure_text_max];
     figure_start(&figure, "frequency in Hz", axis_log);
-    snprintf(label, sizeof label, "%s amplitude in %s", rows[row_torque].name, rows[row_torque].unit);
+    snprintf(label, sizeof label, "%s amplitude in %s", rows[report_torque].name, rows[report_torque].unit);
     struct figure_panel *panel = figure_add_panel(&figure, label, axis_linear);
     panel->height = 110;
     panel->from_zero = true;
-    figure_add_stems(panel, rows[row_torque].name, count, frequency_hz, torque);
-    snprintf(label, sizeof label, "velocity amplitude in %s", rows[row_velocity].unit);
+    figure_add_stems(panel, rows[report_torque].name, count, frequency_hz, torque);
+    snprintf(label, sizeof label, "velocity amplitude in %s", rows[report_velocity].unit);
     panel = figure_add_panel(&figure, label, axis_linear);
     panel->height = 110;
     panel->from_zero = true;
     figure_add_stems(panel, "velocity", count, frequency_hz, velocity)->colour = figure_vermilion;
-    page_add_figure(page, &figure, "Amplitudes of the %zu lines%s", count,
+    page_add_figure(page, &figure, "Amplitudes of the %zu line%s%s", count, count == 1 ? "" : "s",
                     request->torque_shape ? ", in the ratios that were asked for."
                                           : ". They follow from the limits: a line gets what it may have where its "
                                             "tightest limit binds.");
 }
 
-/// Share of the limit that is used where the design has to hold it; 0 without a limit.
-static double used_share(const struct design_request *request, const struct row *row)
-{
-    const double peak = request->grid == design_grid_continuous ? fmax(row->peak, row->peak_continuous) : row->peak;
-    return row->limit > 0 ? peak / row->limit : 0;
-}
-
 /// Names of the quantities that their limit holds back, "torque (99.9 % of 1 Nm) and velocity (99.5 % of 3 rad/s)", or of
 /// all others that have one. Returns how many.
-static size_t write_limits(const struct design_request *request, const struct row *rows, bool binding, size_t size,
-                           char *out_text)
+static size_t write_limits(const struct report_row *rows, bool binding, size_t size, char *out_text)
 {
-    const double nearly_all = 0.995;
     size_t count = 0;
     size_t used = 0;
     out_text[0] = '\0';
-    for (size_t i = 0; i < row_count; i++) {
-        const double share = used_share(request, &rows[i]);
-        if (rows[i].limit > 0 && (share >= nearly_all) == binding && used < size) {
+    for (size_t i = 0; i < report_rows; i++) {
+        const double share = rows[i].used;
+        if (rows[i].limit > 0 && (share >= REPORT_NEARLY_ALL) == binding && used < size) {
             used += (size_t)snprintf(out_text + used, size - used, "%s%s (%.1f %% of %.4g %s)", count > 0 ? ", " : "",
                                      rows[i].name, 100 * share, rows[i].limit, rows[i].unit);
             count++;
@@ -169,13 +111,12 @@ static size_t write_limits(const struct design_request *request, const struct ro
 }
 
 /// The result in a box: what was reached, which limit holds it back, and what more there could be.
-static void add_result(struct page *page, const struct design_request *request, const struct design_result *result,
-                       const struct row *rows)
+static void add_result(struct page *page, const struct design_result *result, const struct report_row *rows)
 {
     char headline[128], binding[256], others[256];
-    const struct row *torque = &rows[row_torque];
-    const size_t bound = write_limits(request, rows, true, sizeof binding, binding);
-    const size_t free_ones = write_limits(request, rows, false, sizeof others, others);
+    const struct report_row *torque = &rows[report_torque];
+    const size_t bound = write_limits(rows, true, sizeof binding, binding);
+    const size_t free_ones = write_limits(rows, false, sizeof others, others);
     snprintf(headline, sizeof headline, "Effective %s %.4f %s, %.0f %% of the bound", torque->name,
              result->effective_torque_Nm, torque->unit, 100 * result->effective_torque_Nm / result->bound_Nm);
     page_add_note(page, bound > 0 ? page_good : page_warning, headline,
@@ -189,10 +130,10 @@ static void add_result(struct page *page, const struct design_request *request, 
 }
 
 /// Between the samples a drive that interpolates the table goes further than at them.
-static void add_excess(struct page *page, const struct row *rows)
+static void add_excess(struct page *page, const struct report_row *rows)
 {
     const double tolerance = 1.0005;
-    for (size_t i = 0; i < row_count; i++) {
+    for (size_t i = 0; i < report_rows; i++) {
         if (rows[i].limit > 0 && rows[i].peak_continuous > tolerance * rows[i].limit) {
             page_add_note(page, page_warning, "Beyond a limit between the samples",
                           "The %s reaches %.5g %s there, %.1f %% of its limit; --grid continuous holds it there too.",
@@ -202,13 +143,13 @@ static void add_excess(struct page *page, const struct row *rows)
     }
 }
 
-static void add_table(struct page *page, const struct row *rows)
+static void add_table(struct page *page, const struct report_row *rows)
 {
     static const char *const heads[] = {"peak of", "at the samples", "in between", "limit", "used", "unit"};
     page_start_table(page, "Peaks against limits.", "lrrrrl", heads);
-    for (size_t i = 0; i < row_count; i++) {
+    for (size_t i = 0; i < report_rows; i++) {
         char at[32], between[32], limit[32], used[32];
-        const struct row *row = &rows[i];
+        const struct report_row *row = &rows[i];
         snprintf(at, sizeof at, "%.5g", row->peak);
         snprintf(between, sizeof between, "%.5g", row->peak_continuous);
         snprintf(limit, sizeof limit, "%.5g", row->limit);
@@ -221,9 +162,9 @@ static void add_table(struct page *page, const struct row *rows)
 }
 
 static void add_pairs(struct page *page, const struct design_request *request, const struct design_result *result,
-                      double line_hz, const struct row *rows)
+                      double line_hz, const struct report_row *rows)
 {
-    const char *unit = rows[row_torque].unit;
+    const char *unit = rows[report_torque].unit;
     page_start_pairs(page);
     page_add_pair(page, "method", "%s, limits held %s", result->method,
                   request->grid == design_grid_continuous ? "at every instant" : "at the samples");
@@ -374,12 +315,12 @@ static void add_start(struct page *page, const struct design_request *request, c
 }
 
 static void add_excitation(struct page *page, const struct design_request *request, const struct design_result *result,
-                           const struct row *rows, double line_hz, double *values)
+                           const struct report_row *rows, double *values)
 {
     add_table(page, rows);
     if (values) {
         add_period(page, request, result, rows, values);
-        add_spectrum(page, request, result, line_hz, rows, values);
+        add_spectrum(page, request, result, rows, values);
     } else {
         page_add_paragraph(page, "Memory was short for the figures of this section.");
     }
@@ -390,13 +331,13 @@ void design_report_sections(struct page *page, const struct design_request *requ
     const double rate_hz = (double)request->rate_numerator_hz / request->rate_denominator;
     const double line_hz = rate_hz / (double)result->period_samples;
     // The lines fit too: there are fewer than half as many of them as samples.
-    double *values = malloc((row_count + 1) * (result->period_samples + 1) * sizeof *values);
-    struct row rows[row_count];
-    make_rows(request, result, rows);
-    add_result(page, request, result, rows);
+    double *values = malloc((report_rows + 1) * (result->period_samples + 1) * sizeof *values);
+    struct report_row rows[report_rows];
+    report_rows_make(request, result, rows);
+    add_result(page, result, rows);
     add_excess(page, rows);
     page_add_section(page, "Excitation");
-    add_excitation(page, request, result, rows, line_hz, values);
+    add_excitation(page, request, result, rows, values);
     add_products(page, result, line_hz);
     add_start(page, request, result, values);
     page_add_section(page, "How it was made");
@@ -407,14 +348,12 @@ void design_report_sections(struct page *page, const struct design_request *requ
 void design_report_section(struct page *page, const char *heading, const struct design_request *request,
                            const struct design_result *result)
 {
-    const double rate_hz = (double)request->rate_numerator_hz / request->rate_denominator;
-    const double line_hz = rate_hz / (double)result->period_samples;
-    double *values = malloc((row_count + 1) * (result->period_samples + 1) * sizeof *values);
-    struct row rows[row_count];
-    make_rows(request, result, rows);
+    double *values = malloc((report_rows + 1) * (result->period_samples + 1) * sizeof *values);
+    struct report_row rows[report_rows];
+    report_rows_make(request, result, rows);
     page_add_section(page, heading);
-    add_result(page, request, result, rows);
+    add_result(page, result, rows);
     add_excess(page, rows);
-    add_excitation(page, request, result, rows, line_hz, values);
+    add_excitation(page, request, result, rows, values);
     free(values);
 }

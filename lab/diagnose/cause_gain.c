@@ -17,32 +17,45 @@ static double squares_of(const struct fit_data *data)
 }
 
 bool cause_gain_measure(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit_data *unseen,
-                        struct diagnosis_cause *io_cause)
+                        int effect, struct cause_gain *out_gain)
 {
     struct hypothesis without = *hypothesis;
     struct sim_model with_model, without_model;
     struct fit trial;
-    hypothesis_unname(&without, io_cause->effect);
+    hypothesis_unname(&without, effect);
     hypothesis_model(hypothesis, NULL, &with_model);
     hypothesis_model(&without, NULL, &without_model);
     const struct diagnosis_figures with = validate_figures(unseen, &with_model),
                                    kept = validate_figures(unseen, &without_model);
     double squares = squares_of(unseen);
-    io_cause->unseen_nats =
+    out_gain->unseen_nats =
         0.5 * squares * (kept.whitened_rms * kept.whitened_rms - with.whitened_rms * with.whitened_rms);
-    io_cause->without = (struct diagnosis_figures){NAN, NAN, NAN};
+    out_gain->without = (struct diagnosis_figures){NAN, NAN, NAN};
     if (!fit_init(&trial, data))
         return false;
     if (fit_roughly(&trial, data, NULL, NULL, &without, iterations, INFINITY)) {
         hypothesis_model(&without, NULL, &without_model);
-        io_cause->without = validate_figures(unseen, &without_model);
+        out_gain->without = validate_figures(unseen, &without_model);
     }
     fit_free(&trial);
     return true;
 }
 
+/// Less than this, in nats, is nothing beside what a cause earns where it was fitted.
+static double little(const struct diagnosis_cause *cause, double share)
+{
+    const double floor_nats = 12.0; // as of a name
+    return fmax(floor_nats, share * cause->evidence);
+}
+
 bool cause_gain_is_hidden(const struct diagnosis_cause *cause)
 {
-    const double visible_nats = 6.0, share = 0.01; // of what it earns where it was fitted
-    return fabs(cause->unseen_nats) < fmax(visible_nats, share * cause->evidence);
+    const double share = 0.01;
+    return fabs(cause->gain.unseen_nats) < little(cause, share);
+}
+
+bool cause_gain_is_harm(const struct diagnosis_cause *cause)
+{
+    const double share = 0.05;
+    return cause->gain.unseen_nats < -little(cause, share);
 }

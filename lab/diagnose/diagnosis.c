@@ -32,7 +32,8 @@ struct work {
     struct held_back parts; ///< of the only run
     struct fit fit;
     struct search_memo memo; ///< of fit_data
-    struct repeat repeat;    ///< of the fit's parameters, on the validation data
+    struct cause_gain gains[sim_effects_max];
+    struct repeat repeat; ///< of the fit's parameters, on the validation data
 };
 
 static void work_free(struct work *w)
@@ -526,8 +527,7 @@ static void add_finding(const struct recording *r, struct diagnosis *d)
     memset(cause, 0, sizeof *cause);
     cause->effect = f->effect;
     cause->evidence = f->evidence;
-    cause->without = (struct diagnosis_figures){NAN, NAN, NAN};
-    cause->unseen_nats = NAN;
+    cause->gain = (struct cause_gain){{NAN, NAN, NAN}, NAN}; // it is no part of the model's error
     memcpy(cause->values, f->values, sizeof cause->values);
     memcpy(cause->deviations, f->deviations, sizeof cause->deviations);
     struct sim_finding finding = {cause->values, cause->deviations, cause->nominal, d->linear};
@@ -557,6 +557,7 @@ static void describe_cause(const struct work *w, const struct diagnosis *d, cons
     memset(out, 0, sizeof *out);
     out->effect = effect;
     out->evidence = search_evidence(&w->fit_data, h, &w->fit, effect);
+    out->gain = w->gains[effect];
     hypothesis_parameters(h, effect, w->fit.covariance, out->values, out->deviations);
     for (size_t i = 0; i < e->parameter_count; i++)
         if (e->parameters[i].model_offset != SIZE_MAX)
@@ -567,22 +568,28 @@ static void describe_cause(const struct work *w, const struct diagnosis *d, cons
     wording_in_units(d, sizeof out->says, out->says);
 }
 
-/// What is nowhere larger than twice its own deviation is no claim, however much of the error it takes.
-static void refuse_vague(const struct work *w, const struct diagnosis *d, const struct hypothesis *h,
-                         struct judgement *io_judgement)
+/// What is nowhere larger than twice its own deviation is no claim, however much of the error it takes; nor is what does
+/// harm on unseen data.
+static void refuse_claims(const struct work *w, const struct diagnosis *d, const struct hypothesis *h,
+                          struct judgement *io_judgement)
 {
     for (int e = 0; sim_effects[e]; e++) {
         struct diagnosis_cause cause;
+        char name[wording_short];
         if (!h->named[e] || !io_judgement->stands[e])
             continue;
         describe_cause(w, d, h, e, &cause);
-        if (!judge_is_vague(sim_effects[e], cause.values, cause.deviations, cause.nominal))
+        wording_effect(e, name);
+        bool harm = cause_gain_is_harm(&cause);
+        if (!harm && !judge_is_vague(sim_effects[e], cause.values, cause.deviations, cause.nominal))
             continue;
         io_judgement->stands[e] = false;
         io_judgement->count--;
         if (!io_judgement->unexplained)
             snprintf(io_judgement->where, sizeof io_judgement->where,
-                     "%s takes part of it, of a size that is not known", sim_effects[e]->id);
+                     harm ? "%s was found on the fitted runs and does harm on unseen data"
+                          : "%s takes part of it, of a size that is not known",
+                     name);
         io_judgement->unexplained = true;
     }
 }
@@ -667,15 +674,12 @@ static double ceiling_rms(const struct work *w, const struct sim_model *extended
     return rms;
 }
 
-/// What each name is worth on unseen data; what was found in the rows themselves is no part of the model's error.
-static bool measure_causes(const struct work *w, struct diagnosis *d, const struct hypothesis *h)
+/// What each name is worth on unseen data.
+static bool measure_gains(struct work *w, const struct hypothesis *h)
 {
     bool good = true;
-    for (size_t i = 0; good && i < d->cause_count + d->candidate_count; i++) {
-        struct diagnosis_cause *cause = i < d->cause_count ? &d->causes[i] : &d->candidates[i - d->cause_count];
-        if (h->named[cause->effect])
-            good = cause_gain_measure(&w->fit_data, h, &w->validate_data, cause);
-    }
+    for (int e = 0; good && sim_effects[e]; e++)
+        good = !h->named[e] || cause_gain_measure(&w->fit_data, h, &w->validate_data, e, &w->gains[e]);
     return good;
 }
 
@@ -707,7 +711,9 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
         return false;
     bool distant = !w->recordings[w->fit_count].periodic &&
                    judge_distance(d->extended.validation_nrmse, d->noise_floor_nrmse, &judgement);
-    refuse_vague(w, d, h, &judgement);
+    if (!measure_gains(w, h))
+        return false;
+    refuse_claims(w, d, h, &judgement);
     d->verdict = judgement.unexplained                                         ? diagnosis_unexplained
                  : judgement.count > 0 || w->recordings[0].finding.effect >= 0 ? diagnosis_explained
                                                                                : diagnosis_no_discrepancy;
@@ -715,7 +721,7 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     list_untestable(w, d, h);
     list_deviations(w, d, h);
     if (!misfit_find(&w->fit_data, &d->given, &d->extended_model, &d->fitted_misfit) ||
-        !misfit_find(&w->validate_data, &d->given, &d->extended_model, &d->misfit) || !measure_causes(w, d, h))
+        !misfit_find(&w->validate_data, &d->given, &d->extended_model, &d->misfit))
         return false;
     if (judgement.unexplained) {
         wording_rest(d, judgement.where, d->where);
@@ -780,17 +786,4 @@ void diagnosis_free(struct diagnosis *self)
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
         free(all[i]);
     memset(self, 0, sizeof *self);
-}
-
-const char *diagnosis_verdict_str(enum diagnosis_verdict verdict)
-{
-    switch (verdict) {
-    case diagnosis_explained:
-        return "explained";
-    case diagnosis_unexplained:
-        return "unexplained";
-    case diagnosis_no_discrepancy:
-        return "no_discrepancy";
-    }
-    return "unknown";
 }

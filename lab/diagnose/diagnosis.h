@@ -27,6 +27,12 @@ struct diagnosis_figures {
     double mean_rms;         ///< the same of the mean of the periods, where noise hides less of what is wrong
 };
 
+/// What a cause is worth on data that the fit has not seen; NaN: not known.
+struct cause_gain {
+    struct diagnosis_figures without; ///< of the extended model without it, the rest refitted
+    double unseen_nats;               ///< what it earns there, everything else kept
+};
+
 /// An effect found, with estimates.
 struct diagnosis_cause {
     int effect;      ///< index in sim_effects
@@ -34,8 +40,7 @@ struct diagnosis_cause {
     double values[sim_effect_parameters_max];
     double deviations[sim_effect_parameters_max];
     double nominal[sim_effect_parameters_max]; ///< of the given model, 0 where it has none
-    struct diagnosis_figures without;          ///< of the extended model without it, the rest refitted; NaN: not known
-    double unseen_nats; ///< what it earns on data the fit has not seen, everything else kept; NaN: not known
+    struct cause_gain gain;
     char says[400];
 };
 

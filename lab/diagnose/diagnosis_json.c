@@ -52,9 +52,9 @@ static bool add_causes(cJSON *root, const char *name, const struct diagnosis_cau
         cJSON *object = append_object(array);
         ok = object && add_text(object, "id", sim_effects[causes[i].effect]->id) &&
              add_number(object, "evidence", causes[i].evidence) &&
-             add_number(object, "validation_nrmse_without", causes[i].without.validation_nrmse) &&
-             add_number(object, "whitened_rms_without", causes[i].without.whitened_rms) &&
-             add_number(object, "validation_evidence", causes[i].unseen_nats) &&
+             add_number(object, "validation_nrmse_without", causes[i].gain.without.validation_nrmse) &&
+             add_number(object, "whitened_rms_without", causes[i].gain.without.whitened_rms) &&
+             add_number(object, "validation_evidence", causes[i].gain.unseen_nats) &&
              add_parameters(object, &causes[i], self) && add_text(object, "says", causes[i].says);
     }
     return ok;
@@ -212,6 +212,19 @@ static bool add_context(cJSON *root, const struct diagnosis *self)
            cJSON_AddBoolToObject(root, "model_given", self->model_given) &&
            cJSON_AddBoolToObject(root, "held_back", self->held_back) &&
            add_number(root, "fit_misfit", self->fit_misfit) && add_gain(root, self);
+}
+
+const char *diagnosis_verdict_str(enum diagnosis_verdict verdict)
+{
+    switch (verdict) {
+    case diagnosis_explained:
+        return "explained";
+    case diagnosis_unexplained:
+        return "unexplained";
+    case diagnosis_no_discrepancy:
+        return "no_discrepancy";
+    }
+    return "unknown";
 }
 
 cJSON *diagnosis_json(const struct diagnosis *self)

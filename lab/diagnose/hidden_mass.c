@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/diagnose/hidden_mass.h"
 
+#include "lab/diagnose/search.h"
+
 #include <math.h>
 #include <stdint.h>
 
@@ -108,13 +110,30 @@ static void try_structure(struct fit_data *data, struct evidence *evidence, cons
     }
 }
 
+/// What an elastic axis may cost beside what a mass on a rigid one does: it has fewer parameters, and of a noise that
+/// follows the parameters only so much is to be believed.
+static double allowed_cost(const struct fit_data *data, const struct hypothesis *before, const struct hypothesis *with,
+                           int structure, double cost)
+{
+    double granted = -search_threshold(data, structure);
+    for (int e = 0; sim_effects[e]; e++)
+        if (sim_effects[e]->attach && with->named[e] && !before->named[e])
+            granted += search_threshold(data, e);
+    return hidden_mass_credible_cost(data, cost) + 2.0 * fmax(granted, 0.0);
+}
+
 bool hidden_mass_instead(struct fit_data *data, struct evidence *evidence, const struct sim_coverage *coverage,
                          const struct hypothesis *before, double cost, struct fit *fit, struct hypothesis *io_h)
 {
-    double best = cost;
-    for (int e = 0; sim_effects[e]; e++)
-        if (sim_effects[e]->engage && hypothesis_may_name(before, e) &&
-            before->engaged.structure == before->given->structure)
-            try_structure(data, evidence, coverage, before, e, &best, fit, io_h);
-    return best < cost && hidden_mass_fit(data, evidence, fit, io_h);
+    const struct hypothesis with = *io_h;
+    bool found = false;
+    for (int e = 0; sim_effects[e] && !found; e++) {
+        if (!sim_effects[e]->engage || !hypothesis_may_name(before, e) ||
+            before->engaged.structure != before->given->structure)
+            continue;
+        double allowed = allowed_cost(data, before, &with, e, cost), best = allowed;
+        try_structure(data, evidence, coverage, before, e, &best, fit, io_h);
+        found = best < allowed;
+    }
+    return found && hidden_mass_fit(data, evidence, fit, io_h);
 }

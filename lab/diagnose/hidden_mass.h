@@ -36,7 +36,8 @@ void hidden_mass_release(const struct hypothesis *free, struct hypothesis *io_hy
 bool hidden_mass_holds(const struct hypothesis *hypothesis, int effect);
 
 /// A mass that swings on a rigid axis is half of what an elastic axis is: fits the structures that may be named beside
-/// `before`, from a few places. Returns whether one does better than `cost`; io_h and the fit are its then.
+/// `before`, from a few places. Returns whether one does as well as `cost`, with what it has fewer parameters for
+/// granted; io_h and the fit are its then. `io_h` names the mass on entry.
 bool hidden_mass_instead(struct fit_data *data, struct evidence *evidence, const struct sim_coverage *coverage,
                          const struct hypothesis *before, double cost, struct fit *fit, struct hypothesis *io_h);
 

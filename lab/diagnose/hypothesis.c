@@ -177,6 +177,10 @@ static void name_parameter(struct hypothesis *self, int effect, size_t i, const 
         x = values[i] / c.unit;
         c.lower = low / c.unit;
         c.upper = high / c.unit;
+        if (p->near_whole > 0.0) {
+            c.centre = floor(values[i] + 0.5) / c.unit;
+            c.weight = c.unit / p->near_whole;
+        }
         break;
     case sim_parameter_positive:
         c.scale = coordinate_logarithmic;

@@ -386,7 +386,8 @@ size_t judge_ties(const struct fit_data *data, const struct sim_coverage *covera
         if (!hypothesis->named[out])
             continue;
         hypothesis_unname(&without, out);
-        if (!fit_run(&without_fit, data, &without, trial_iterations))
+        // A name that may as well be missing is tied to whatever else may be missing.
+        if (!fit_run(&without_fit, data, &without, trial_iterations) || without_fit.cost < most_cost)
             continue;
         for (int in = 0; sim_effects[in] && count < most; in++) {
             if (hypothesis->named[in] || !replaces(data, coverage, &without, &without_fit, in, most_cost))
@@ -412,7 +413,9 @@ bool judge_is_vague(const struct sim_effect *effect, const double *values, const
         sinusoid = sinusoid || effect->parameters[i].kind == sim_parameter_amplitude;
     for (size_t i = 0; i < effect->parameter_count; i++) {
         const enum sim_parameter_kind kind = effect->parameters[i].kind;
-        if (kind == sim_parameter_phase || (sinusoid && kind != sim_parameter_amplitude))
+        // Phases and what is optional say how, not how much.
+        if (kind == sim_parameter_phase || effect->parameters[i].optional ||
+            (sinusoid && kind != sim_parameter_amplitude))
             continue;
         if (!(fabs(values[i] - nominal[i]) < certain * deviations[i]))
             return false;

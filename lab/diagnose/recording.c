@@ -46,11 +46,17 @@ static const double *either(const struct run *run, const char *rotary, const cha
 }
 
 static int refuse_column(const struct run *run, const char *what, const char *rotary, const char *linear,
-                         struct error *out_error)
+                         const char *map, struct error *out_error)
 {
-    return error_set(out_error, error_refused,
-                     "%s: no %s: a column %s (or %s on a linear axis) is needed; --map can name one",
-                     run->path ? run->path : "run", what, rotary, linear);
+    char columns[200] = "none";
+    size_t used = 0;
+    for (size_t i = 0; i < run->column_count && used < sizeof columns; i++)
+        used +=
+            (size_t)snprintf(columns + used, sizeof columns - used, "%s%s", i > 0 ? ", " : "", run->columns[i].name);
+    return error_set(
+        out_error, error_refused,
+        "%s: no %s: a column %s (or %s on a linear axis) is needed, the file has %s: --map %s says which it is",
+        run->path ? run->path : "run", what, rotary, linear, columns, map);
 }
 
 static int refuse_memory(const struct run *run, struct error *out_error)
@@ -121,9 +127,11 @@ static int take_columns(const struct run *run, struct recording *r, struct error
     const double *position = either(run, "position_rad", "position_m");
     const double *velocity = either(run, "velocity_rad_per_s", "velocity_m_per_s");
     if (!input.measured)
-        return refuse_column(run, "torque", "torque_Nm, current_A, voltage_V", "force_N", out_error);
+        return refuse_column(run, "torque", "torque_Nm, current_A, voltage_V", "force_N", "current_A=COLUMN",
+                             out_error);
     if (!position && !velocity)
-        return refuse_column(run, "motion", "position_rad", "position_m", out_error);
+        return refuse_column(run, "motion", "position_rad", "position_m", "position_rad=COLUMN*RAD_PER_UNIT",
+                             out_error);
     r->all.samples = run->rows;
     r->input_unit = input.unit;
     r->all.torque = copied(input.measured, run->rows);

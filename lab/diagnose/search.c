@@ -314,12 +314,14 @@ static bool find_one_for(const struct fit_data *data, const struct sim_coverage 
 }
 
 /// A wrong name that came first may have needed another to make up for it. Returns whether one took the place of two.
+/// Where what is left is nowhere near noise, likelihoods do not decide between one and two, and nothing is looked for.
 static bool merge_two(const struct fit_data *data, const struct sim_coverage *coverage, struct hypothesis *io_h,
                       struct fit *io_fit)
 {
+    const double far = 3.0;
     struct fit base;
     bool merged = false;
-    if (!fit_init(&base, data))
+    if (io_fit->cost > far * (double)data->values || !fit_init(&base, data))
         return false;
     for (int a = 0; sim_effects[a] && !merged; a++)
         for (int b = a + 1; io_h->named[a] && sim_effects[b] && !merged; b++) {

@@ -124,27 +124,29 @@ void wording_unseen(const struct diagnosis *self, const struct diagnosis_cause *
 {
     char without[wording_short], with[wording_short];
     out_text[0] = '\0';
-    if (!isfinite(cause->without.validation_nrmse) || !isfinite(cause->unseen_nats))
+    if (!isfinite(cause->gain.unseen_nats))
         return;
-    wording_percent(cause->without.validation_nrmse, without);
+    wording_percent(cause->gain.without.validation_nrmse, without);
     wording_percent(self->extended.validation_nrmse, with);
     if (cause_gain_is_hidden(cause))
         snprintf(out_text, wording_size,
                  "It cannot show in the data judged on, and is neither confirmed nor refuted there.");
-    else if (cause->unseen_nats < 0.0)
+    else if (cause->gain.unseen_nats > 0.0 && !isfinite(cause->gain.without.validation_nrmse))
+        snprintf(out_text, wording_size, "On unseen data it earns %.0f nats.", cause->gain.unseen_nats);
+    else if (cause->gain.unseen_nats < 0.0)
         snprintf(out_text, wording_size,
                  "On unseen data it does harm as it stands (%.0f nats): its size does not hold there.",
-                 cause->unseen_nats);
+                 cause->gain.unseen_nats);
     else if (sim_effects[cause->effect]->in_time) // the error is that of the mean of the periods, which hides it
         snprintf(out_text, wording_size,
                  "On unseen data it earns %.0f nats; without it, the rest refitted, one-step errors there are %.3f "
                  "instead of %.3f times what is expected.",
-                 cause->unseen_nats, cause->without.whitened_rms, self->extended.whitened_rms);
+                 cause->gain.unseen_nats, cause->gain.without.whitened_rms, self->extended.whitened_rms);
     else
         snprintf(
             out_text, wording_size,
             "On unseen data it earns %.0f nats; without it, the rest refitted, the error there is %s instead of %s.",
-            cause->unseen_nats, without, with);
+            cause->gain.unseen_nats, without, with);
 }
 
 /// What to measure where an axis says most.

@@ -76,11 +76,16 @@ bool difference_measure(const struct frf *first, const struct frf *other, double
 /// "lies 0.12 dB higher than a.csv (median of 250 lines in common)".
 static void say_level(const struct difference *self, const char *first_name, char *out_text, size_t size)
 {
+    char of[64] = "the one line in common";
+    if (self->common != 1) {
+        snprintf(of, sizeof of, "median of %zu lines in common", self->common);
+    }
     if (isfinite(self->middle_db)) {
-        snprintf(out_text, size, "lies %.2g dB %s than %s (median of %zu lines in common)", fabs(self->middle_db),
-                 self->middle_db < 0.0 ? "lower" : "higher", first_name, self->common);
+        snprintf(out_text, size, "lies %.2g dB %s than %s (%s)", fabs(self->middle_db),
+                 self->middle_db < 0.0 ? "lower" : "higher", first_name, of);
     } else {
-        snprintf(out_text, size, "has %zu lines in common with %s", self->common, first_name);
+        snprintf(out_text, size, "has %zu line%s in common with %s", self->common, self->common == 1 ? "" : "s",
+                 first_name);
     }
 }
 

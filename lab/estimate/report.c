@@ -124,7 +124,7 @@ static void add_bode(const struct report_drawing *drawing, const struct frf_repo
                      struct figure *figure)
 {
     char label[figure_text_max];
-    snprintf(label, sizeof label, "magnitude in dB, 0 dB is 1 %s", units);
+    snprintf(label, sizeof label, "magnitude in dB, 0 dB is %s", units);
     struct bode panels = {figure_add_panel(figure, label, axis_linear), NULL};
     panels.phase = figure_add_panel(figure, "phase in degrees", axis_degrees);
     panels.magnitude->height = 220;
@@ -138,7 +138,7 @@ static void add_deviations(const struct report_drawing *drawing, const char *uni
 {
     const struct report_lines *lines = &drawing->lines;
     char label[figure_text_max];
-    snprintf(label, sizeof label, "standard deviation in dB, 0 dB is 1 %s", units);
+    snprintf(label, sizeof label, "standard deviation in dB, 0 dB is %s", units);
     struct figure_panel *panel = figure_add_panel(figure, label, axis_linear);
     panel->height = 110;
     struct figure_series *total = figure_add_points(panel, lines->noise_differs ? "std, total" : "std", lines->count,
@@ -268,14 +268,21 @@ static void add_smoothness(struct page *page, const struct smoothness *smoothnes
     }
 }
 
+/// A file that others wrote may not say what it is of.
+static const char *name_or(const char *name, const char *otherwise)
+{
+    return name[0] ? name : otherwise;
+}
+
 static void add_sentences(struct page *page, const struct frf *frf, const struct report_drawing *drawing,
                           const struct frf_report_options *options)
 {
     const struct report_lines *lines = &drawing->lines;
     char amount[remark_size];
     write_amount(frf, amount);
-    page_add_paragraph(page, "From %s to %s by method %s%s, %zu of %zu lines valid.", frf->input, frf->output,
-                       frf->method, amount, lines->count, frf->count);
+    page_add_paragraph(page, "From %s to %s%s%s%s, %zu of %zu line%s valid.", name_or(frf->input, "the input"),
+                       name_or(frf->output, "the output"), frf->method[0] ? " by method " : "", frf->method, amount,
+                       lines->count, frf->count, frf->count == 1 ? "" : "s");
     if (options->curve_count == 0 && !drawing->is_model) {
         add_smoothness(page, &drawing->smoothness);
     }
@@ -330,7 +337,7 @@ void frf_report_section(struct page *page, const struct frf *frf, const struct f
     }
     write_delay(frf, options, drawing.known_delay_s, delay);
     write_degrees(frf, degrees);
-    page_add_figure(page, &figure, "%s to %s; std is that of the complex value%s.%s", frf->input, frf->output, degrees,
-                    delay);
+    page_add_figure(page, &figure, "%s to %s; std is that of the complex value%s.%s", name_or(frf->input, "The input"),
+                    name_or(frf->output, "the output"), degrees, delay);
     report_drawing_free(&drawing);
 }

@@ -91,7 +91,7 @@ static void add_levels(struct page *page, const struct frf *frf, const struct le
     char units[report_units_size];
     char label[figure_text_max];
     report_units(frf->units, units);
-    snprintf(label, sizeof label, "level in dB, 0 dB is 1 %s", units);
+    snprintf(label, sizeof label, "level in dB, 0 dB is %s", units);
     figure_start(&figure, "frequency in Hz", axis_log);
     struct figure_panel *panel = figure_add_panel(&figure, label, axis_linear);
     add_points(panel, "response", levels, curve_response, figure_blue, figure_circle);

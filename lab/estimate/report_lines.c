@@ -5,6 +5,7 @@
 #include "lab/numeric/statistics.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +18,7 @@ void report_units(const char *units, char out_text[report_units_size])
     const char *over = strchr(units, '/');
     const size_t numerator = over ? (size_t)(over - units) : strlen(units);
     const bool compound = over && memchr(units, '_', numerator);
-    size_t used = 0;
+    size_t used = (size_t)snprintf(out_text, report_units_size, units[0] ? "1 " : "1");
     for (const char *at = units; *at && used + 4 < report_units_size;) {
         if (at == units && compound) {
             out_text[used++] = '(';

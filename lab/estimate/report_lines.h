@@ -57,7 +57,7 @@ struct report_drawing {
 
 enum { report_units_size = 56 };
 
-/// "rad_per_s/Nm" as a person writes it: "(rad/s)/Nm".
+/// One unit of "rad_per_s/Nm" as a person writes it: "1 (rad/s)/Nm"; of "", which is not known, "1".
 void report_units(const char *units, char out_text[report_units_size]);
 
 /// Errors: false if memory is short; report_drawing_free() in every case

@@ -28,8 +28,8 @@ const struct report_words *report_words_of(bool linear)
 static void add_end_note(struct page *page, const struct run *run, const struct measure_report *report)
 {
     if (report->end == measure_complete) {
-        page_add_note(page, page_good, "Complete", "%zu settling and %zu counted periods of %zu samples.",
-                      run->settle_periods, run->periods, run->period_samples);
+        page_add_note(page, page_good, "Complete", "%zu settling and %zu counted period%s of %zu samples.",
+                      run->settle_periods, run->periods, run->periods == 1 ? "" : "s", run->period_samples);
     } else {
         page_add_note(page, page_bad, "Stopped early",
                       "%s. Kept are %zu of %zu rows: %zu settling and %zu counted whole periods.", report->stopped_by,
@@ -278,8 +278,9 @@ static void add_settling(struct page *page, const struct measure_summary *summar
     page_add_figure(page, &figure,
                     "RMS of what each period differs by from period %zu, over the RMS of that, means removed. A start "
                     "transient falls from the left; what stays level is noise, that of both periods. The first %zu of "
-                    "%zu periods do not count%s.",
+                    "%zu periods %s not count%s.",
                     summary->reference + 1, summary->run->settle_periods, summary->whole,
+                    summary->run->settle_periods == 1 ? "does" : "do",
                     summary->lost > 0 ? "; periods with lost samples are left out" : "");
     free(numbers);
 }
@@ -301,7 +302,9 @@ static void add_ratio(struct page *page, const char *name, size_t count, const d
             ratios[found++] = measured[i] / table[i];
         }
     }
-    if (found > 0) {
+    if (found == 1) {
+        page_add_item(page, name, "has %.3g times the table's amplitude at its line.", ratios[0]);
+    } else if (found > 0) {
         qsort(ratios, found, sizeof *ratios, ascending);
         page_add_item(page, name,
                       "has %.3g times the table's amplitude at the middle one of %zu lines, %.3g to %.3g "
@@ -336,7 +339,7 @@ void report_add_spectrum(struct page *page, bool linear, size_t count, const dou
         points->marker = figure_circle;
         points->size = 3;
     }
-    page_add_figure(page, &figure, "Amplitudes at the %zu excited lines%s.", count, what);
+    page_add_figure(page, &figure, "Amplitudes at the %zu excited line%s%s.", count, count == 1 ? "" : "s", what);
 }
 
 static void add_spectrum(struct page *page, const struct measure_summary *summary)

@@ -27,7 +27,7 @@ static const char style[] =
     "figcaption{margin-top:8px;max-width:58em}\n"
     "figcaption b,caption b{color:var(--text);font-weight:600}\n"
     "table{border-collapse:collapse;font-size:13.5px;line-height:1.4;font-variant-numeric:tabular-nums;"
-    "margin:16px 0 24px;min-width:50%}\n"
+    "min-width:50%}.tb{margin:16px 0 24px;overflow-x:auto}\n"
     "caption{padding-bottom:6px}\n"
     "th{font-weight:600;text-align:left;border-top:1.5px solid var(--frame);border-bottom:1px solid var(--frame)}\n"
     "th,td{padding:5px 18px 5px 0;vertical-align:baseline}th:last-child,td:last-child{padding-right:2px}\n"
@@ -52,8 +52,20 @@ static const char style[] =
     "@media screen and (max-width:700px){figure>.fig{max-width:none}}\n"
     "@page{size:A4;margin:15mm 15mm 17mm}\n"
     "@media print{body{padding:0;max-width:none;font-size:10.5pt}h1{font-size:18pt}h2{font-size:13pt}"
-    "h2,h3{break-after:avoid}figure,tr,li,dl{break-inside:avoid}p{orphans:3;widows:3}figure{overflow:visible}"
+    "h2,h3{break-after:avoid}figure,tr,li,dl{break-inside:avoid}p{orphans:3;widows:3}figure,.tb{overflow:visible}"
     "thead{display:table-header-group}footer{margin-top:8mm;break-before:avoid}.row{flex-wrap:nowrap}}\n";
+
+/* Sentences that the terminal shows too are plain ASCII; a page has the sign. */
+static void write_sentence(FILE *out, const char *text)
+{
+    static const char plain[] = " +- ";
+    for (const char *at = strstr(text, plain); at != NULL; at = strstr(text, plain)) {
+        text_write_span(out, (struct text_span){text, (size_t)(at - text)});
+        fputs(" \xC2\xB1 ", out);
+        text = at + strlen(plain);
+    }
+    text_write(out, text);
+}
 
 #if defined(__GNUC__)
 __attribute__((format(printf, 2, 0)))
@@ -71,7 +83,7 @@ write_formatted(FILE *out, const char *format, va_list arguments)
     }
     va_end(again);
     if (length >= 0) {
-        text_write(out, text != NULL ? text : line);
+        write_sentence(out, text != NULL ? text : line);
     }
     free(text);
 }
@@ -212,7 +224,7 @@ void page_start_table(struct page *self, const char *caption, const char *align,
     text_copy(align, sizeof self->align, self->align);
     self->rows = 0;
     self->tables++;
-    fprintf(self->out, "<table><caption><b>Table %u</b> ", self->tables);
+    fprintf(self->out, "<div class=\"tb\"><table><caption><b>Table %u</b> ", self->tables);
     text_write(self->out, caption);
     fputs("</caption>\n<thead><tr>", self->out);
     for (size_t c = 0; c < self->columns; c++) {
@@ -240,7 +252,7 @@ void page_end_table(struct page *self)
     if (self->rows == 0) {
         fprintf(self->out, "<tr><td class=\"none\" colspan=\"%zu\">no data</td></tr>\n", self->columns);
     }
-    fputs("</tbody></table>\n", self->out);
+    fputs("</tbody></table></div>\n", self->out);
 }
 
 void page_start_row(struct page *self)

@@ -2,8 +2,8 @@
 #include "lab/page/figure.h"
 
 /* Okabe and Ito's palette, darker where thin lines need it on white and lighter on black. */
-static const char light_colours[] = "--c0:#2a3038;--c1:#0067a8;--c2:#cf5400;--c3:#008a64;--c4:#b35a92;--c5:#c98a00;"
-                                    "--c6:#3a9fd6;--c7:#8b94a0;--grid:#e3e7ec;--minor:#f0f2f5;--frame:#7d8794;"
+static const char light_colours[] = "--c0:#2a3038;--c1:#0067a8;--c2:#cf5400;--c3:#008a64;--c4:#b35a92;--c5:#bd8200;"
+                                    "--c6:#2f93ca;--c7:#8b94a0;--grid:#e3e7ec;--minor:#f0f2f5;--frame:#7d8794;"
                                     "--paper:#fff;--text:#1c2127;--dim:#59626e;";
 static const char dark_colours[] = "--c0:#d5dae0;--c1:#5fb0ec;--c2:#ff8a45;--c3:#35c79b;--c4:#e29bc6;--c5:#eeb62f;"
                                    "--c6:#93d3f8;--c7:#8792a0;--grid:#2c333c;--minor:#20262d;--frame:#788492;"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /// Universal files: dataset 58, time responses as a run, a frequency response function as a response
 /// (docs/files.md, "Universal files").
+#include "lab/record/foreign_text.h"
 #include "lab/record/record_table.h"
 #include "lab/record/run_names.h"
 #include "lab/record/uff58.h"
@@ -14,7 +15,7 @@
 /* A rate from a step of 6 digits is as uncertain as this; a whole number within it is taken to be meant. */
 static const double rate_rounding = 5e-6;
 
-enum { name_size = 128 };
+enum { name_size = 192 };
 
 static enum format_match recognise(const unsigned char *head, size_t length)
 {
@@ -123,17 +124,21 @@ static bool has_column(const struct text_table *table, const char *name)
     return false;
 }
 
-/* A name of its own for a foreign function: its first line, or what its axis says; numbered where there are two. */
+/* A name of its own for a foreign function: its first line with the units that its axis says, or what the axis says;
+   numbered where there are two. A name that a run knows has its unit in it. */
 static void name_function(const struct uff58 *f, const struct text_table *table, char out_name[name_size])
 {
-    char name[name_size - 12];
+    char name[name_size / 2], numbered[name_size / 2 + 16];
     snprintf(name, sizeof name, "%s", f->id[0]);
     uff_clean_name(name);
     if (!name[0])
         uff_name_column(&f->numerator, &f->response, false, sizeof name, name);
-    snprintf(out_name, name_size, "%s", name);
-    for (int number = 2; has_column(table, out_name); number++)
-        snprintf(out_name, name_size, "%s_%d", name, number);
+    const char *units = run_name_axis(name) == run_axis_unknown ? f->numerator.units : "";
+    foreign_name(name, units, out_name, name_size);
+    for (int number = 2; has_column(table, out_name); number++) {
+        snprintf(numbered, sizeof numbered, "%s_%d", name, number);
+        foreign_name(numbered, units, out_name, name_size);
+    }
 }
 
 static void note_units(const struct uff_file *file, struct format_notes *notes)
@@ -199,8 +204,7 @@ static int take_foreign_signals(const char *path, struct uff_file *file, const s
         }
         first = first ? first : f;
         name_function(f, table, name);
-        format_notes_add(notes, format_kept, "function %zu (line %zu) as column '%s'%s%s", i + 1, f->line, name,
-                         f->numerator.units[0] ? ", units " : "", f->numerator.units);
+        format_notes_add(notes, format_kept, "function %zu (line %zu) as column '%s'", i + 1, f->line, name);
         status = move_column(f, name, table, out_error);
     }
     note_units(file, notes);
@@ -233,7 +237,8 @@ static int read_run(const char *path, struct uff_file *file, const struct format
         text_table_free(&table);
         return status;
     }
-    return run_take_table(&table, &options->run, &out_record->run, out_error);
+    return is_ours(file) ? run_take_table(&table, &options->run, &out_record->run, out_error)
+                         : foreign_take_run(&table, options, &out_record->run, notes, out_error);
 }
 
 /* The response to take: the only one, or the one that --function names. */

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <zlib.h>
 
 enum {
@@ -60,6 +61,14 @@ void line_reader_close(struct line_reader *self)
 size_t line_reader_number(const struct line_reader *self)
 {
     return self->number;
+}
+
+double line_reader_share(const struct line_reader *self)
+{
+    struct stat file;
+    const z_off_t read = gzoffset(self->file);
+    const bool known = stat(self->path, &file) == 0 && S_ISREG(file.st_mode) && file.st_size > 0 && read > 0;
+    return known ? (double)read / (double)file.st_size : 0.0;
 }
 
 /* Appends the chunk's bytes at .. at + length to the joined line. */

@@ -30,6 +30,9 @@ enum line_status line_reader_next(struct line_reader *self, struct line *out_lin
 /// Number of the line that was last read; 0 before the first.
 size_t line_reader_number(const struct line_reader *self);
 
+/// How much of the file has been read, packed or not, 0 to 1; 0 if it is none with a length.
+double line_reader_share(const struct line_reader *self);
+
 void line_reader_close(struct line_reader *self);
 
 #endif

@@ -128,9 +128,6 @@ static const char *scan_decimal(const char *at, const char *end, struct decimal 
     return any ? at : NULL;
 }
 
-#ifdef __SIZEOF_INT128__
-__extension__ typedef unsigned __int128 uint128;
-
 /* 5^0 .. 5^27 are exact in 64 bits. */
 static const uint64_t powers_of_five[] = {
     1,
@@ -163,28 +160,63 @@ static const uint64_t powers_of_five[] = {
     7450580596923828125,
 };
 
+#ifdef __SIZEOF_INT128__
+__extension__ typedef unsigned __int128 uint128;
+
+/* The upper 64 bits of a b, and whether the lower ones are not all zero. */
+static uint64_t multiply(uint64_t a, uint64_t b, bool *out_more)
+{
+    const uint128 product = (uint128)a * b;
+    *out_more = (uint64_t)product != 0;
+    return (uint64_t)(product >> 64);
+}
+
+/* a 2^63 / b, rounded down, and whether something is left over; both have their highest bit. */
+static uint64_t divide(uint64_t a, uint64_t b, bool *out_more)
+{
+    const uint128 dividend = (uint128)a << 63;
+    *out_more = dividend % b != 0;
+    return (uint64_t)(dividend / b);
+}
+#else
+static uint64_t multiply(uint64_t a, uint64_t b, bool *out_more)
+{
+    const uint64_t a_low = (uint32_t)a, a_high = a >> 32, b_low = (uint32_t)b, b_high = b >> 32;
+    const uint64_t low = a_low * b_low, cross = a_high * b_low + (low >> 32);
+    const uint64_t middle = a_low * b_high + (uint32_t)cross;
+    *out_more = (uint32_t)low != 0 || (uint32_t)middle != 0;
+    return a_high * b_high + (cross >> 32) + (middle >> 32);
+}
+
+static uint64_t divide(uint64_t a, uint64_t b, bool *out_more)
+{
+    uint64_t quotient = a >= b, rest = a >= b ? a - b : a;
+    for (int bit = 0; bit < 63; bit++) {
+        const bool carry = rest >> 63 != 0;
+        rest <<= 1;
+        quotient <<= 1;
+        if (carry || rest >= b) {
+            rest -= b;
+            quotient |= 1;
+        }
+    }
+    *out_more = rest != 0;
+    return quotient;
+}
+#endif
+
 /* digits 5^power or digits / 5^-power as 62 to 64 bits times a power of two. What those bits leave out is never zero
  * and never half a last place of the 53 that a double has: it sets the lowest bit, so that rounding them to a double
  * rounds as the exact value would. */
 static double scale_by_five(uint64_t digits, int power, int exponent)
 {
-    int shift = __builtin_clzll(digits);
-    uint64_t factor = powers_of_five[abs(power)];
-    int factor_shift = __builtin_clzll(factor);
-    uint128 product = (uint128)(digits << shift) << 63;
-    uint64_t bits, rest;
-    exponent -= shift;
-    if (power < 0) {
-        bits = (uint64_t)(product / (factor << factor_shift));
-        rest = (uint64_t)(product % (factor << factor_shift));
-        exponent += factor_shift - 63;
-    } else {
-        product = (product >> 63) * (factor << factor_shift);
-        bits = (uint64_t)(product >> 64);
-        rest = (uint64_t)product;
-        exponent += 64 - factor_shift;
-    }
-    return ldexp((double)(bits | (rest != 0)), exponent);
+    const int shift = __builtin_clzll(digits);
+    const int factor_shift = __builtin_clzll(powers_of_five[abs(power)]);
+    const uint64_t factor = powers_of_five[abs(power)] << factor_shift;
+    bool more;
+    const uint64_t bits = power < 0 ? divide(digits << shift, factor, &more) : multiply(digits << shift, factor, &more);
+    exponent += power < 0 ? factor_shift - 63 - shift : 64 - factor_shift - shift;
+    return ldexp((double)(bits | more), exponent);
 }
 
 /* Whether the value is that of a double that is neither too large nor denormal, in so few operations that rounding can
@@ -205,20 +237,6 @@ static bool convert_fast(const struct decimal *decimal, double *out_value)
     *out_value = decimal->negative ? -value : value;
     return true;
 }
-#else
-static bool convert_fast(const struct decimal *decimal, double *out_value)
-{
-    int scale = decimal->scale;
-    if (!decimal->plain || decimal->significant > digits_max || decimal->digits > exact_integer_max ||
-        abs(scale) > exact_power_max)
-        return false;
-    // Both factors are exact doubles, so the one rounding of the product or quotient is strtod's.
-    double value = (double)decimal->digits;
-    value = scale < 0 ? value / exact_powers[-scale] : value * exact_powers[scale];
-    *out_value = decimal->negative ? -value : value;
-    return true;
-}
-#endif
 
 /* strtod reads the locale's decimal mark, so the point is replaced by it; the text has passed scan_decimal. */
 static double convert(const char *text, size_t length)

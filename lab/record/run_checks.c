@@ -13,7 +13,7 @@ static const char *const field_keys[] = {"sample_rate_hz", "period_samples", "pe
                                          "settle_periods", "excited_bins",   "table_crc32"};
 
 /* Numbers in a run must describe a recording that can be; anything beyond is a typing error. */
-static const double count_max = 9007199254740992.0; /* 2^53: exact in a double */
+static const double count_max = SIZE_MAX > UINT32_MAX ? 9007199254740992.0 : UINT32_MAX; /* 2^53: exact in a double */
 static const double rate_min_hz = 1e-3, rate_max_hz = 1e9;
 
 /* No axis has such a value in any unit, and sums of squares of greater ones overflow far from here. */

@@ -126,6 +126,11 @@ size_t run_stream_rows(const struct run_stream *self)
     return self->text.row_total;
 }
 
+double run_stream_share(const struct run_stream *self)
+{
+    return text_stream_share(&self->text);
+}
+
 void run_stream_forget(struct run_stream *self)
 {
     text_stream_forget_rows(&self->text);

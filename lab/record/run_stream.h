@@ -32,6 +32,9 @@ bool run_stream_ended(const struct run_stream *self);
 /// Rows read so far, forgotten ones included.
 size_t run_stream_rows(const struct run_stream *self);
 
+/// How much of the file has been read, 0 to 1; 0 of a pipe, whose length nobody knows.
+double run_stream_share(const struct run_stream *self);
+
 /// Gives up the rows in memory; their room is used again.
 void run_stream_forget(struct run_stream *self);
 

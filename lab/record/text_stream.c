@@ -355,6 +355,11 @@ double *text_stream_give_column(struct text_stream *self, size_t column)
     return data;
 }
 
+double text_stream_share(const struct text_stream *self)
+{
+    return self->lines ? line_reader_share(self->lines) : 0.0;
+}
+
 void text_stream_close(struct text_stream *self)
 {
     line_reader_close(self->lines);

@@ -41,6 +41,9 @@ void text_stream_forget_rows(struct text_stream *self);
 /// The values of a column, which belong to the caller from here on; forget the rows once all wanted ones are given.
 double *text_stream_give_column(struct text_stream *self, size_t column);
 
+/// How much of the file has been read (line_reader_share).
+double text_stream_share(const struct text_stream *self);
+
 void text_stream_close(struct text_stream *self);
 
 #endif

@@ -2,6 +2,7 @@
 // The encoder's disc runs out of true: it says th + a cos(th + phase). A speed that is derived from it is wrong with
 // it, v (1 - r a sin(th + phase)) with r = 1; one from a sensor of its own is not, r = 0. On a linear axis the encoder
 // is the motor's and th the position over the pulley's radius.
+// Two columns alone show a (1 - r): r is one or the other.
 #include "sim/effect.h"
 #include "sim/model.h"
 
@@ -90,6 +91,7 @@ const struct sim_effect sim_effect_encoder_eccentricity = {
                     .linear_maximum = 1.0,
                     .optional = true,
                     .usual = 1.0,
+                    .near_whole = 0.05,
                     .model_offset = SIZE_MAX}},
     .sense = eccentricity_sense,
     .scan = eccentricity_scan,

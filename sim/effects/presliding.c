@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-// Dry friction does not switch where motion reverses: it builds up over a distance, dF/dx = (s Fd - F) / distance, Fd
-// the level that Coulomb's and all other dry friction sets (Dahl's model with exponent 1).
+// Dry friction does not switch where motion reverses: it builds up over a distance, dF/dx = s Fd (1 - s F / Fd)^n /
+// distance, Fd the level that Coulomb's and all other dry friction sets (Dahl's model with exponent n). With n = 1 it
+// comes near its level as an exponential does; the smaller n, the more it goes straight there, as springs do that give
+// way all at once.
 #include "sim/effect.h"
 #include "sim/model.h"
 
@@ -11,8 +13,9 @@
 /// Below this the motor is as good as stuck: motion estimated from a measurement is no finer. Rad, and m.
 static const double least = 1e-4, linear_least = 1e-6;
 
-static double presliding_build_up(const double *p)
+static double presliding_build_up(const double *p, double *out_exponent)
 {
+    *out_exponent = p[1] > 0.0 ? p[1] : 1.0;
     return p[0];
 }
 
@@ -23,6 +26,7 @@ static bool presliding_scan(const struct sim_model *model, const struct sim_cove
     double start = coverage->linear ? linear_least : least;
     (void)model;
     out[0] = 2.0 * start * pow(growth, (double)index);
+    out[1] = 1.0;
     return index == 0 || (index < 8 && out[0] < 0.2 * coverage->position_span);
 }
 
@@ -53,7 +57,7 @@ static bool presliding_applies(const struct sim_model *model)
 const struct sim_effect sim_effect_presliding = {
     .id = "presliding",
     .place = sim_place_friction,
-    .parameter_count = 1,
+    .parameter_count = 2,
     .parameters = {{.name = "presliding_distance_rad",
                     .linear_name = "presliding_distance_m",
                     .kind = sim_parameter_positive,
@@ -61,6 +65,16 @@ const struct sim_effect sim_effect_presliding = {
                     .maximum = 10.0,
                     .linear_minimum = 1e-9,
                     .linear_maximum = 1.0,
+                    .model_offset = SIZE_MAX},
+                   {.name = "presliding_exponent",
+                    .linear_name = "presliding_exponent",
+                    .kind = sim_parameter_positive,
+                    .minimum = 0.1,
+                    .maximum = 3.0,
+                    .linear_minimum = 0.1,
+                    .linear_maximum = 3.0,
+                    .optional = true,
+                    .usual = 1.0,
                     .model_offset = SIZE_MAX}},
     .build_up = presliding_build_up,
     .applies = presliding_applies,

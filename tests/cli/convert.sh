@@ -46,6 +46,20 @@ for one, other in zip(a, b):
 PYTHON
 done
 
+# From each format to each other: what holds all bits gives back the file that it came from.
+for one in csv $formats; do
+    for other in csv $formats; do
+        for kind in run frf; do
+            source=$kind.$one
+            "$SERVOSCOPE" convert "$source" "pair.$other" --to "$other" --quiet || fail "$kind from $one to $other"
+            "$SERVOSCOPE" convert "pair.$other" pair-back.csv --quiet || fail "$kind back from $other, that came from $one"
+            reference=$kind.csv
+            [ "$one" != uff ] && [ "$other" != uff ] || reference=$kind-uff.csv
+            cmp "$reference" pair-back.csv || fail "$kind from $one through $other"
+        done
+    done
+done
+
 # A gzipped file is read as it is; the result through any format does for frf what the run itself did.
 gzip -k run.csv
 gzip -k run.uff

@@ -386,7 +386,7 @@ static double moved(double from, double to, double ratio)
 
 void truth_kind_refit(enum truth_kind kind, const struct truth_plant_spec *truth, struct truth_plant_spec *io_plant)
 {
-    const double usual = 0.10, of_load = 0.05;
+    const double usual = 0.10, of_load = 0.05, of_belt = 0.08;
     if (kind == truth_kind_viscous_friction) {
         io_plant->viscous_friction_Nms_per_rad =
             moved(io_plant->viscous_friction_Nms_per_rad, truth->viscous_friction_Nms_per_rad, usual);
@@ -398,6 +398,10 @@ void truth_kind_refit(enum truth_kind kind, const struct truth_plant_spec *truth
         io_plant->torque_lag_s = moved(io_plant->torque_lag_s, truth->torque_lag_s, usual);
     } else if (kind == truth_kind_dead_time) {
         io_plant->dead_time_s = moved(io_plant->dead_time_s, truth->dead_time_s, usual);
+    } else if (kind == truth_kind_position_dependent_stiffness) { // about its middle, where the belt may be off anyhow
+        double there = 1.0 + truth->stiffness_slope_per_rad * truth->coulomb_origin_rad;
+        io_plant->belt_stiffness_Nm_per_rad =
+            moved(io_plant->belt_stiffness_Nm_per_rad, there * truth->belt_stiffness_Nm_per_rad, of_belt);
     }
 }
 

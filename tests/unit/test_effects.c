@@ -76,11 +76,11 @@ static void test_effects_have_unique_known_ids_and_can_be_found(void)
 
 static void test_effects_parameters_have_units_at_the_end_of_their_names_on_both_axes(void)
 {
-    static const char *const rotary[] = {"_Nm",        "_Nms_per_rad", "_Nm_per_rad", "_kgm2",    "_rad",
-                                         "_rad_per_s", "_s",           "_hz",         "_per_rev", "_per_rad",
-                                         "_per_rad2",  "_ratio",       "share",       NULL};
-    static const char *const linear[] = {"_N",  "_Ns_per_m", "_N_per_m", "_kg",    "_m",   "_m_per_s", "_s",
-                                         "_hz", "_per_m",    "_per_m2",  "_ratio", "_rad", "share",    NULL};
+    static const char *const rotary[] = {"_Nm",        "_Nms_per_rad", "_Nm_per_rad", "_kgm2",     "_rad",
+                                         "_rad_per_s", "_s",           "_hz",         "_per_rev",  "_per_rad",
+                                         "_per_rad2",  "_ratio",       "share",       "_exponent", NULL};
+    static const char *const linear[] = {"_N",     "_Ns_per_m", "_N_per_m", "_kg",  "_m",    "_m_per_s",  "_s", "_hz",
+                                         "_per_m", "_per_m2",   "_ratio",   "_rad", "share", "_exponent", NULL};
     for (size_t e = 0; sim_effects[e]; e++) {
         const struct sim_effect *effect = sim_effects[e];
         TEST_ASSERT_TRUE_MESSAGE(effect->parameter_count >= 1 && effect->parameter_count <= sim_effect_parameters_max,

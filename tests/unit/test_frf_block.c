@@ -393,15 +393,15 @@ static void test_block_folded_period_cannot_overflow(void)
     }
 }
 
-static void expect_gap_spoils_only_its_periods(uint32_t repeats)
+/* Gaps of each `step`th place and length. */
+static void expect_gap_spoils_only_its_periods(uint32_t period, const struct frf_block_layout *layout, uint32_t step)
 {
-    const uint32_t period = 40, total = 200;
-    const struct frf_block_layout small = {8, 8, repeats};
+    const uint32_t total = 5 * period;
     static int32_t expected[5][2u * 6u];
     struct frf_block dft;
     struct frf_block_period latched;
     regular_bins(9, 2, 1);
-    build(period, &small);
+    build(period, layout);
     fill_random(total);
     start(&dft, 1, 2, false);
     for (uint32_t p = 0; p < 5; p++) {
@@ -409,10 +409,10 @@ static void expect_gap_spoils_only_its_periods(uint32_t repeats)
         TEST_ASSERT_TRUE(frf_block_latest(&dft, &latched));
         memcpy(expected[p], latched.accumulators, sizeof expected[p]);
     }
-    for (uint32_t at = 0; at < total; at++) {
-        for (uint32_t lost = 1; at + lost <= total; lost++) {
+    for (uint32_t at = 0; at < total; at += step) {
+        for (uint32_t lost = 1; at + lost <= total; lost += step) {
             uint32_t seen = 0;
-            start(&dft, 1, 2, (at + lost) % 2 != 0);
+            start(&dft, 1, 2, (at + lost) % 3 != 0);
             for (uint32_t n = 0; n < total; n += n == at ? lost : 1u) {
                 if (n == at)
                     frf_block_skip(&dft, lost);
@@ -434,8 +434,113 @@ static void expect_gap_spoils_only_its_periods(uint32_t repeats)
 
 static void test_block_gap_anywhere_spoils_only_its_periods(void)
 {
-    expect_gap_spoils_only_its_periods(1);
-    expect_gap_spoils_only_its_periods(2);
+    static const struct frf_block_layout small = {8, 8, 1}, folded = {8, 8, 2}, basis = {32, 16, 1};
+    expect_gap_spoils_only_its_periods(40, &small, 1);
+    expect_gap_spoils_only_its_periods(37, &small, 2);
+    expect_gap_spoils_only_its_periods(40, &folded, 1);
+    expect_gap_spoils_only_its_periods(90, &basis, 7);
+}
+
+/* Spread work is done when the next block lacks a sample, with a block's length of time or, where the period is no
+ * whole number of blocks, at least half of it. */
+static void test_block_spread_result_is_there_before_the_next_block_is_full(void)
+{
+    static const struct {
+        uint32_t period, delay;
+        struct frf_block_layout layout;
+    } cases[] = {{96, 31, {32, 32, 1}},   {97, 16, {32, 32, 1}},    {100, 17, {32, 32, 1}}, {127, 31, {32, 32, 1}},
+                 {2000, 39, {64, 24, 1}}, {384, 127, {128, 12, 1}}, {192, 31, {32, 32, 2}}};
+    for (unsigned c = 0; c < sizeof cases / sizeof cases[0]; c++) {
+        for (uint32_t channels = 1; channels <= channels_max; channels++) {
+            regular_bins(cases[c].layout.terms < cases[c].layout.block_samples ? 7 : 47, 2, 1);
+            build(cases[c].period, &cases[c].layout);
+            fill_random(cases[c].period * channels);
+            struct frf_block dft;
+            struct frf_block_period latched;
+            start(&dft, channels, 2, true);
+            feed_in_chunks(&dft, cases[c].period, 1);
+            for (uint32_t n = 0; n < cases[c].delay; n++) {
+                if (n < cases[c].delay * 3u / 4u)
+                    TEST_ASSERT_FALSE(frf_block_latest(&dft, &latched));
+                frf_block_add_i16(&dft, samples, 1);
+            }
+            TEST_ASSERT_TRUE(frf_block_latest(&dft, &latched));
+            TEST_ASSERT_EQUAL_UINT32(0, latched.reasons);
+        }
+    }
+}
+
+/* Started over or torn by a gap after any sample of the first period and a half: the next whole period is as if nothing
+ * had been before, though the work on a block was cut off; nothing of that work comes in one burst. */
+static void test_block_cut_off_work_leaves_nothing_behind(void)
+{
+    static const struct frf_block_layout layouts[] = {{32, 32, 1}, {32, 16, 1}, {64, 24, 1}, {8, 8, 2}};
+    const uint32_t period = 136;
+    static int32_t expected[2u * 8u * channels_max];
+    for (unsigned l = 0; l < 4; l++) {
+        struct frf_block dft;
+        struct frf_block_period latched;
+        regular_bins(13, 2, 1);
+        build(period, &layouts[l]);
+        fill_random(period * channels_max);
+        start(&dft, channels_max, 2, false);
+        frf_block_add_i16(&dft, samples, period);
+        TEST_ASSERT_TRUE(frf_block_latest(&dft, &latched));
+        size_t bytes = sizeof *expected * 2u * FRF_BLOCK_ROWS(bin_count) * channels_max;
+        TEST_ASSERT_TRUE(bytes <= sizeof expected);
+        memcpy(expected, latched.accumulators, bytes);
+        for (uint32_t cut = 0; cut < 2 * (period + period / 2u); cut++) {
+            uint32_t before = cut / 2u;
+            start(&dft, channels_max, 1u + before % 2u, true);
+            for (uint32_t n = 0; n < before; n++)
+                frf_block_add_i16(&dft, samples + n % period * channels_max, 1);
+            uint32_t done = dft.sequence;
+            if (cut % 2u == 0)
+                frf_block_restart(&dft);
+            else
+                frf_block_skip(&dft, 2u * period - before);
+            TEST_ASSERT_TRUE(dft.sequence >= done);
+            done = dft.sequence;
+            TEST_ASSERT_EQUAL_UINT32(0, dft.run.pairs);
+            feed_in_chunks(&dft, period, 1);
+            for (uint32_t n = 0; n < 63u && dft.sequence == done; n++)
+                frf_block_add_i16(&dft, samples, 1);
+            TEST_ASSERT_TRUE(frf_block_latest(&dft, &latched));
+            TEST_ASSERT_EQUAL_UINT32(done + 1u, latched.sequence);
+            TEST_ASSERT_EQUAL_UINT32(0, latched.reasons);
+            TEST_ASSERT_EQUAL_MEMORY(expected, latched.accumulators, bytes);
+            expect_canaries(&dft);
+        }
+    }
+}
+
+/* One bank, and the first block of the new period lost in a gap while it was worked on: the period before is still told
+ * to be overwritten before anything is. */
+static void test_block_gap_does_not_hide_that_a_bank_is_written_to(void)
+{
+    const uint32_t period = 96;
+    spread_bins(40, 9);
+    build(period, &folded_32);
+    fill_random(period);
+    for (uint32_t worked = 0; worked <= 32; worked++) {
+        struct frf_block dft;
+        struct frf_block_period latched;
+        start(&dft, 1, 1, true);
+        frf_block_add_i16(&dft, samples, period);
+        frf_block_add_i16(&dft, samples, 32);
+        TEST_ASSERT_TRUE(frf_block_latest(&dft, &latched));
+        feed_in_chunks(&dft, worked, 1);
+        frf_block_skip(&dft, 1);
+        for (uint32_t n = 0; n < 60; n++) {
+            int32_t held[4];
+            bool intact = frf_block_is_intact(&dft, &latched);
+            memcpy(held, storage, sizeof held);
+            frf_block_add_i16(&dft, samples, 1);
+            if (intact && memcmp(held, storage, sizeof held) != 0)
+                TEST_ASSERT_FALSE(frf_block_is_intact(&dft, &latched));
+        }
+        TEST_ASSERT_FALSE(frf_block_is_intact(&dft, &latched));
+    }
 }
 
 /* One bank: readable until the next period's first block is worked on. Two: until the one after next's. */
@@ -674,6 +779,9 @@ int main(void)
     RUN_TEST(test_block_folded_period_signal_to_noise);
     RUN_TEST(test_block_folded_period_cannot_overflow);
     RUN_TEST(test_block_gap_anywhere_spoils_only_its_periods);
+    RUN_TEST(test_block_spread_result_is_there_before_the_next_block_is_full);
+    RUN_TEST(test_block_cut_off_work_leaves_nothing_behind);
+    RUN_TEST(test_block_gap_does_not_hide_that_a_bank_is_written_to);
     RUN_TEST(test_block_keeps_a_period_as_long_as_its_banks_allow);
     RUN_TEST(test_block_restart_finishes_the_period_before);
     RUN_TEST(test_block_gaps_do_not_pile_up_in_the_folded_period);

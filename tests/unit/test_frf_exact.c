@@ -297,6 +297,29 @@ static void test_exact_kernel_at_the_rims(void)
     }
 }
 
+/* A sum over segments, wherever they are cut and whatever wraps on its way, is what the kernel makes of the whole. */
+static void test_exact_sum_of_segments_is_the_whole(void)
+{
+    enum { groups = 5 };
+    static const int32_t values[] = {INT32_MIN, INT32_MAX, -1, 1, 0x40000000, -123456789, 987654321};
+    int32_t data[4 * groups], rows[8 * groups + 4] = {0}, whole[4], parts[4];
+    for (uint32_t round = 0; round < 343; round++) {
+        for (uint32_t t = 0; t < 4 * groups; t++)
+            data[t] = values[(round + t * t) % 7];
+        for (uint32_t t = 0; t < 8 * groups; t++)
+            rows[t] = values[(round / 7 + t * (round / 49)) % 7];
+        memset(whole, 0x7F, sizeof whole);
+        frf_block_accumulate_portable(whole, rows, data, 1, groups);
+        for (uint32_t cut = 1; cut < groups; cut++) {
+            memset(parts, 0x35, sizeof parts);
+            frf_block_sum_portable(parts, rows, data, cut, true);
+            frf_block_sum_portable(parts, rows + 8 * cut, data + 4 * cut, groups - cut, false);
+            frf_block_end_sum(parts);
+            TEST_ASSERT_EQUAL_INT32_ARRAY(whole, parts, 4);
+        }
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -304,5 +327,6 @@ int main(void)
     RUN_TEST(test_exact_all_bins_of_long_and_prime_periods);
     RUN_TEST(test_exact_block_equals_its_definition_for_worst_inputs);
     RUN_TEST(test_exact_kernel_at_the_rims);
+    RUN_TEST(test_exact_sum_of_segments_is_the_whole);
     return UNITY_END();
 }

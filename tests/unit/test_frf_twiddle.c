@@ -194,8 +194,8 @@ static void factors_at(struct frf_dft *dft, uint32_t n, struct frf_period *out_p
     TEST_ASSERT_TRUE(frf_dft_latest(dft, out_period));
 }
 
-static const uint32_t long_periods[] = {97,   100,  127,  128,  250,   1002,  1009,
-                                        1023, 1024, 2000, 2003, 16384, 65521, 65536};
+static const uint32_t long_periods[] = {97,   100,  127,  128,  250,  300,   511,   1002, 1009,
+                                        1024, 2000, 2003, 4093, 8191, 16384, 65521, 65536};
 enum { short_periods = 61, period_list = short_periods + sizeof long_periods / sizeof *long_periods };
 
 /* 4 .. 64, then the list. */
@@ -350,6 +350,27 @@ static void test_two_level_factors_are_as_defined_and_within_bounds(void)
             number_names[number], worst[number], bounds[number], differing[number], all);
         TEST_ASSERT_TRUE(worst[number] <= bounds[number]);
     }
+}
+
+/* Every N there is. On an axis a factor is 1 or -1, and a step more would wrap; beside it, 0 within the bound. */
+static void test_two_level_factors_on_the_axes_are_not_beyond_one(void)
+{
+    unsigned long axes = 0;
+    for (uint32_t period = 4; period <= period_max; period++) {
+        TEST_ASSERT_EQUAL_INT(core_ok,
+                              frf_two_level_build_q31(words.coarse_q31, FRF_COARSE_POINTS(period), words.fine_q31,
+                                                      FRF_FINE_TURNS(period), period, &two_level.q31));
+        for (uint32_t q = 0; q < 4; q++) {
+            if (q * period % 4 != 0)
+                continue;
+            struct factor factor = defined_factor(frf_number_q31, period, q * period / 4u);
+            int64_t along = q % 2 ? factor.sine : factor.cosine, across = q % 2 ? factor.cosine : factor.sine;
+            along = q < 2 ? along : -along;
+            TEST_ASSERT_TRUE(along <= FRF_Q31_ONE && along >= FRF_Q31_ONE - 1 && across >= -1 && across <= 1);
+            axes++;
+        }
+    }
+    printf("two-level Q31: %lu factors on an axis, N = 4 .. 65536\n", axes);
 }
 
 /* high 2^32 + low, 0 <= low < 2^32 */
@@ -603,6 +624,7 @@ int main(void)
     RUN_TEST(test_quarter_factors_are_the_full_tables);
     RUN_TEST(test_quarter_sums_are_the_full_tables_for_any_cut);
     RUN_TEST(test_two_level_factors_are_as_defined_and_within_bounds);
+    RUN_TEST(test_two_level_factors_on_the_axes_are_not_beyond_one);
     RUN_TEST(test_two_level_sums_are_exact_for_worst_inputs);
     RUN_TEST(test_two_level_signal_to_noise_of_the_arithmetic);
     RUN_TEST(test_tables_refuse_what_cannot_work);

@@ -179,7 +179,7 @@ static void test_predict_leaves_nothing_of_a_third_mass(void)
 
 static void test_predict_leaves_nothing_of_friction_that_builds_up(void)
 {
-    switch_on("presliding", 3e-3, 0.0, 0.0);
+    switch_on("presliding", 3e-3, 1.0, 0.0);
     assert_predicts_itself();
     two_masses();
     switch_all_on();

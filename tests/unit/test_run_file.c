@@ -173,10 +173,17 @@ static void test_run_read_refuses_keys_that_do_not_fit(void)
          "run.csv: 0 settling and 3 counted periods of 4 samples do not fit the 8 rows of the file"},
         {"# sample_rate_hz: 1\n# period_samples: 4\n# periods: 1\n# settle_periods: 2\n",
          "run.csv: 2 settling and 1 counted periods of 4 samples do not fit the 8 rows of the file"},
+#if SIZE_MAX > UINT32_MAX
         {"# sample_rate_hz: 1\n# period_samples: 9007199254740992\n# periods: 9007199254740992\n",
          "run.csv: 0 settling and 9007199254740992 counted periods of 9007199254740992 samples do not fit the 8 rows "
          "of the "
          "file"},
+#else
+        {"# sample_rate_hz: 1\n# period_samples: 4294967295\n# periods: 4294967295\n",
+         "run.csv: 0 settling and 4294967295 counted periods of 4294967295 samples do not fit the 8 rows "
+         "of the "
+         "file"},
+#endif
         {"# sample_rate_hz: 1\n# periods: 2\n", "run.csv: periods or settle_periods without period_samples"},
         {"# sample_rate_hz: 1\n# period_samples: 8\n# excited_bins: [1, 3, 3]\n",
          "run.csv:3: excited_bins: at '3]': bins have to ascend"},

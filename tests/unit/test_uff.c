@@ -255,14 +255,17 @@ static void test_uff_signals_of_another_system_are_read(void)
 {
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, read_text(two_signals, &no_options), error.message);
     static const double force[] = {1, -2, -0.3, 4, 5, -6, 7}, slide[] = {1.25, 2, 3, 4, 5, 6, -0.75};
-    const double *a = run_column(&record.run, "Motor force_ left"), *b = run_column(&record.run, "Slide");
+    // The axes state N and mm: the units say what the signals are, and that millimetres are none of SI.
+    const double *a = run_column(&record.run, "force_N"), *b = run_column(&record.run, "position_m");
     TEST_ASSERT_TRUE(a && b && record.run.rows == 7);
     TEST_ASSERT_EQUAL_MEMORY(force, a, sizeof force);
-    TEST_ASSERT_EQUAL_MEMORY(slide, b, sizeof slide);
+    for (size_t n = 0; n < 7; n++)
+        TEST_ASSERT_TRUE(b[n] == slide[n] * 0.001);
     // 1/3.33333e-4 is 3000.003: the step has 6 digits, and 3000 is within them.
     TEST_ASSERT_TRUE(record.run.sample_rate_hz == 3000);
     TEST_ASSERT_TRUE(noted(format_assumed, "sample rate 3000 Hz"));
-    TEST_ASSERT_TRUE(noted(format_kept, "column 'Slide', units mm"));
+    TEST_ASSERT_TRUE(noted(format_kept, "column 'Slide [mm]'"));
+    TEST_ASSERT_TRUE(noted(format_assumed, "position_m is Slide [mm] times 0.001"));
 }
 
 static void test_uff_signals_of_another_system_take_names_and_scale_by_map(void)
@@ -334,7 +337,8 @@ static void test_uff_binary_of_another_system_is_read(void)
         const char *path = scratch_bytes("in", bytes, (size_t)length);
         TEST_ASSERT_EQUAL_INT_MESSAGE(0, format_by_name("uff")->read(path, &no_options, &record, &notes, &error),
                                       error.message);
-        TEST_ASSERT_TRUE(run_column(&record.run, "x")[0] == 1 && run_column(&record.run, "x")[1] == -2.5);
+        const double *x = run_column(&record.run, "force_N"); // called x, its axis in N
+        TEST_ASSERT_TRUE(x && x[0] == 1 && x[1] == -2.5);
         TEST_ASSERT_TRUE(record.run.sample_rate_hz == 2);
         record_free(&record);
     }

@@ -40,12 +40,7 @@ struct work {
 static void show_progress(void *context, double share_done, double effective)
 {
     struct work *self = context;
-    if (!terminal_line_due(&self->line)) {
-        return;
-    }
-    double elapsed_s = terminal_line_elapsed_s(&self->line);
-    fprintf(stderr, "\r\033[K%5.1f %%  %.4f %s  %.0f s left", 100 * share_done, effective,
-            self->request.linear ? "N" : "Nm", share_done > 0 ? elapsed_s * (1 - share_done) / share_done : NAN);
+    terminal_line_show(&self->line, share_done, "%.4f %s", effective, self->request.linear ? "N" : "Nm");
 }
 
 /// A model has to be of the kind of axis that is designed for.

@@ -202,8 +202,8 @@ static int write_page(const struct arguments *arguments, const struct frf *frf, 
     }
     snprintf(title, sizeof title, "A %s controller of %.4g Hz", arguments->tune.structure,
              arguments->tune.bandwidth_hz);
-    snprintf(subtitle, sizeof subtitle, "for %s to %s as measured in %s", frf->input, frf->output,
-             arguments->files.items[0]);
+    snprintf(subtitle, sizeof subtitle, "%s%s%s, as measured in %s", frf->input, frf->input[0] ? " to " : "A response",
+             frf->output, arguments->files.items[0]);
     page_start(&page, stream, title, subtitle);
     tune_report_sections(&page, frf, result);
     // A write error is kept by the stream, and commit reports it with the path and the reason.

@@ -142,8 +142,8 @@ static int write_page(const struct comparing_request *request, const struct comp
     } else {
         snprintf(title, sizeof title, "Frequency responses %s and %zu more", all->names[0], all->count - 1);
     }
-    snprintf(subtitle, sizeof subtitle, "%s to %s, as saved by frf", all->responses[0].input, all->responses[0].output);
-    page_start(&page, stream, title, subtitle);
+    snprintf(subtitle, sizeof subtitle, "%s to %s, as saved", all->responses[0].input, all->responses[0].output);
+    page_start(&page, stream, title, all->responses[0].input[0] ? subtitle : NULL);
     frf_report_section(&page, &all->responses[0], &options);
     frf_report_distortion_section(&page, &all->responses[0], NULL);
     // A write error is kept by the stream, and commit reports it with the path and the reason.

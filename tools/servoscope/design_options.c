@@ -88,12 +88,10 @@ static int read_rate(const char *text, struct design_request *request, struct er
     double denominator = 1;
     const char *slash = strchr(text, '/');
     snprintf(numerator_text, sizeof numerator_text, "%.*s", slash ? (int)(slash - text) : 63, text);
-    int status = options_parse_number("--rate", numerator_text, &numerator, out_error);
-    if (!status && slash) {
-        status = options_parse_number("--rate", slash + 1, &denominator, out_error);
-    }
-    if (status) {
-        return status;
+    if (options_parse_number("--rate", numerator_text, &numerator, NULL) ||
+        (slash && options_parse_number("--rate", slash + 1, &denominator, NULL))) {
+        return error_set(out_error, error_usage, "--rate: '%s' is not a number, expected HZ or a fraction, 8000/3",
+                         text);
     }
     double rate_hz = numerator / denominator;
     if (!(numerator > 0 && denominator > 0 && rate_hz >= rate_min_hz && rate_hz <= rate_max_hz)) {

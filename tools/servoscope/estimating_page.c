@@ -6,7 +6,6 @@
 #include "lab/page/page.h"
 #include "tools/servoscope/estimating_model.h"
 
-#include <ctype.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -192,28 +191,33 @@ static void add_settling(const struct estimating_page_item *item, struct page *p
     page_add_figure(page, &figure,
                     "RMS of what each period's output differs by from the mean of the later half, over all lines. "
                     "A start transient falls from the left; what stays level is noise. %s: the first %zu of %zu "
-                    "periods do not count.",
-                    file_name(item->sources->items[0]), outcome->runs[0].settle, outcome->runs[0].total);
+                    "periods %s not count.",
+                    file_name(item->sources->items[0]), outcome->runs[0].settle, outcome->runs[0].total,
+                    outcome->runs[0].settle == 1 ? "does" : "do");
     free(numbers);
+}
+
+static const struct remark *find_fact(const struct remarks *remarks, const char *id)
+{
+    for (size_t r = 0; r < remarks->count; r++) {
+        if (remarks->items[r].level != remark_warning && strcmp(remarks->items[r].id, id) == 0) {
+            return &remarks->items[r];
+        }
+    }
+    return NULL;
 }
 
 /// What the page is about in a box: which lines, how certain, whether the runs agree.
 static void add_result(const struct remarks *remarks, struct page *page)
 {
-    static const char *const ids[] = {"response", "uncertainty", "realisations"};
-    char text[1024] = "";
-    size_t used = 0;
-    for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
-        for (size_t r = 0; r < remarks->count; r++) {
-            const struct remark *one = &remarks->items[r];
-            if (one->level != remark_warning && strcmp(one->id, ids[i]) == 0 &&
-                used + strlen(one->text) + 4 < sizeof text) {
-                used += (size_t)snprintf(text + used, sizeof text - used, "%s%c%s.", used > 0 ? " " : "",
-                                         toupper((unsigned char)one->text[0]), one->text + 1);
-            }
-        }
+    const struct remark *response = find_fact(remarks, "response");
+    const struct remark *uncertainty = find_fact(remarks, "uncertainty");
+    const struct remark *realisations = find_fact(remarks, "realisations");
+    if (response) {
+        page_add_note(page, page_plain, response->text, "%s%s%s%s%s", uncertainty ? "Uncertainty: " : "",
+                      uncertainty ? uncertainty->text : "", uncertainty ? ". " : "",
+                      realisations ? realisations->text : "", realisations ? "." : "");
     }
-    page_add_note(page, page_plain, "Result", "%s", text);
 }
 
 static void add_item(const struct estimating_page_item *item, struct page *page)

@@ -101,6 +101,13 @@ static int find_in_leading(const struct run *run, const struct periodic_options 
     return status;
 }
 
+static void show_rows(const struct run_stream *stream, struct terminal_line *line)
+{
+    const double millions = 1e-6 * (double)run_stream_rows(stream);
+    terminal_line_show(line, run_stream_share(stream), "%.1f million rows, %.2f million a second", millions,
+                       millions / terminal_line_elapsed_s(line));
+}
+
 static int take_rest(const struct estimating_pieces *self, const struct periodic *leading, struct online *online,
                      struct error *out_error)
 {
@@ -115,10 +122,7 @@ static int take_rest(const struct estimating_pieces *self, const struct periodic
             status = online_take(online, run_column(piece, leading->input), run_column(piece, leading->output),
                                  run_column(piece, "valid"), piece->rows, out_error);
         }
-        if (terminal_line_due(&line)) {
-            const double rows = (double)run_stream_rows(self->stream);
-            fprintf(stderr, "\r%.1f million rows   ", 1e-6 * rows);
-        }
+        show_rows(self->stream, &line);
     }
     terminal_line_clear(&line);
     return status ? status : run_stream_finish(self->stream, out_error);
@@ -272,9 +276,7 @@ static int take_parts(struct estimating_pieces *self, const struct periodic_opti
         }
         frf_free(&one);
         run_free(&part);
-        if (terminal_line_due(&line)) {
-            fprintf(stderr, "\r%.1f million rows   ", 1e-6 * (double)run_stream_rows(self->stream));
-        }
+        show_rows(self->stream, &line);
     }
     terminal_line_clear(&line);
     return status ? status : run_stream_finish(self->stream, out_error);

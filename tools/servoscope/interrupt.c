@@ -3,6 +3,8 @@
 
 #include "ports/wall_clock.h"
 
+#include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -68,6 +70,24 @@ bool terminal_line_due(struct terminal_line *self)
     }
     self->shown_s = now;
     return true;
+}
+
+void terminal_line_show(struct terminal_line *self, double share, const char *format, ...)
+{
+    va_list arguments;
+    if (!terminal_line_due(self)) {
+        return;
+    }
+    fputs("\r\033[K", stderr);
+    if (share > 0.0) {
+        fprintf(stderr, "%5.1f %%  ", 100.0 * fmin(share, 1.0));
+    }
+    va_start(arguments, format);
+    vfprintf(stderr, format, arguments);
+    va_end(arguments);
+    if (share > 0.0) {
+        fprintf(stderr, ", %.0f s left", fmax(0.0, terminal_line_elapsed_s(self) * (1.0 - share) / share));
+    }
 }
 
 void terminal_line_clear(const struct terminal_line *self)

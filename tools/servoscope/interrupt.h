@@ -41,6 +41,12 @@ bool terminal_line_due(struct terminal_line *self);
 /// Seconds since the start.
 double terminal_line_elapsed_s(const struct terminal_line *self);
 
+/// Writes "41.3 %  TEXT, 12 s left" if it is time to: `share` of the work is done, 0 or less where nobody knows.
+#if defined(__GNUC__)
+__attribute__((format(printf, 3, 4)))
+#endif
+void terminal_line_show(struct terminal_line *self, double share, const char *format, ...);
+
 /// Takes the line away.
 void terminal_line_clear(const struct terminal_line *self);
 

@@ -167,9 +167,8 @@ static struct modbus_host_setup make_setup(const struct job *self)
 static bool show_upload(void *context, size_t done, size_t total)
 {
     struct job *self = context;
-    if (terminal_line_due(&self->line)) {
-        fprintf(stderr, "\rupload %3.0f %%   ", 100.0 * (double)done / (double)total);
-    }
+    terminal_line_show(&self->line, (double)done / (double)total, "upload, %.1f KiB a second",
+                       (double)done / 1024.0 / terminal_line_elapsed_s(&self->line));
     return !*interrupt_flag();
 }
 
@@ -250,10 +249,8 @@ static enum modbus_host_status read_periods(struct job *self)
 
 static void show_run(struct job *self, double share)
 {
-    if (terminal_line_due(&self->line)) {
-        fprintf(stderr, "\r%5.1f %%  %s, period %u   ", 100.0 * share, modbus_state_str(self->state.state),
-                (unsigned)self->state.periods_done);
-    }
+    terminal_line_show(&self->line, share, "%s, period %u", modbus_state_str(self->state.state),
+                       (unsigned)self->state.periods_done);
 }
 
 /// Until the drive says that it is done. Reading slower than it measures is allowed: then the means tell.
@@ -264,6 +261,7 @@ static int follow(struct job *self, struct error *out_error)
                      2.0 * measure_ramp_samples(plan->table, plan->mode) + 2.0 * plan->fade_samples;
     double longest_s = 1.5 * (samples / rate_hz(plan->table) + measure_dwell_s) + patience_s;
     double started_s = wall_clock_now_s();
+    self->line.started_s = started_s; // the upload's pace says nothing of the run's
     do {
         enum modbus_host_status got = modbus_host_read_state(&self->host, &self->state);
         if (got == modbus_host_ok && *interrupt_flag() && !self->interrupted) {

@@ -46,6 +46,9 @@ static int check_range(const struct option *option, const char *text, double val
 
 static int append_value(struct option_values *values, const char *what, const char *text, struct error *out_error)
 {
+    if (*text == '\0') {
+        return error_set(out_error, error_usage, "%s: the value is empty", what);
+    }
     if (values->count >= option_values_max) {
         return error_set(out_error, error_usage, "%s: more than %d values, the first too many is '%s'", what,
                          (int)option_values_max, text);

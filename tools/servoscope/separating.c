@@ -145,8 +145,7 @@ static int measure(void *user, const struct sim_model *drive, const struct varia
 static bool show_progress(void *user, const char *what, size_t done, size_t total)
 {
     struct progress *progress = user;
-    if (terminal_line_due(&progress->line))
-        fprintf(stderr, "\r\033[K%zu of %zu: %s", done + 1, total, what);
+    terminal_line_show(&progress->line, (double)done / (double)total, "%zu of %zu: %s", done + 1, total, what);
     return !*interrupt_flag();
 }
 

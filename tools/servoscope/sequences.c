@@ -2,7 +2,7 @@
 #include "tools/servoscope/sequences.h"
 
 #include "lab/design/amplitude.h"
-#include "lab/design/report.h"
+#include "lab/design/report_sequence.h"
 #include "lab/page/page.h"
 #include "lab/record/atomic_file.h"
 #include "lab/record/manifest.h"
@@ -29,7 +29,7 @@ struct work {
     struct sequences_summary *summary;
     struct sequence_file manifest;
     double *shape; ///< of all lines of one input, in order; NULL: by the limits
-    struct page page;
+    struct design_report_sequence page;
     bool paged; ///< a page is wanted, and begun
     size_t tables_written;
     size_t tables_done;
@@ -244,9 +244,8 @@ static int design_table(struct work *self, size_t segment, size_t input, struct 
             cJSON_AddItemToArray(self->summary->segments, describe_table(self, segment, input, &request, &result));
         }
         if (!status && self->paged) {
-            char heading[160];
-            snprintf(heading, sizeof heading, "%s", manifest_name_of(table_path(self, segment, input, ".mst")));
-            design_report_section(&self->page, heading, &request, &result);
+            const char *name = manifest_name_of(table_path(self, segment, input, ".mst"));
+            status = design_report_sequence_add(&self->page, name, &request, &result) ? 0 : refuse_memory(&reason);
         }
         design_result_free(&result);
     }
@@ -293,38 +292,59 @@ static int write_manifest(struct work *self, struct error *out_error)
     return sequence_file_write(manifest_path(self), manifest, out_error);
 }
 
-static void start_page(struct work *self, FILE *stream)
+/// The page is made last, when everything that it sums up is known.
+static int write_page(struct work *self, FILE *stream, struct error *out_error)
 {
     const struct sequences_summary *summary = self->summary;
     const struct design_sequence *sequence = &summary->sequence;
     char title[192], subtitle[320];
+    struct page page;
     snprintf(title, sizeof title, "Excitations %s", manifest_name_of(manifest_path(self)));
     snprintf(subtitle, sizeof subtitle,
              "%s: %zu segments, %zu tables of %zu samples at %.6g Hz, %zu lines, measuring takes %.4g s",
              design_sequence_kind_str(sequence->kind), sequence->segment_count,
              sequence->segment_count * sequence->inputs, sequence->period_samples, sequence->rate_hz,
              summary->line_count, summary->test_time_s);
-    page_start(&self->page, stream, title, subtitle);
+    page_start(&page, stream, title, subtitle);
+    if (!design_report_sequence_write(&self->page, &page)) {
+        return refuse_memory(out_error);
+    }
+    // A write error is kept by the stream, and commit reports it with the path and the reason.
+    (void)page_end(&page, "servoscope " SERVOSCOPE_VERSION);
+    return 0;
+}
+
+static int open_page(struct work *self, struct atomic_file *out_file, FILE **out_stream, struct error *out_error)
+{
+    if (!self->request->report) {
+        return 0;
+    }
+    *out_stream = atomic_file_open(out_file, self->request->report, out_error);
+    if (!*out_stream) {
+        return error_refused;
+    }
+    self->paged = true;
+    return design_report_sequence_begin(&self->page) ? 0 : refuse_memory(out_error);
 }
 
 static int design_all(struct work *self, struct error *out_error)
 {
     struct atomic_file file = {0};
-    if (self->request->report) {
-        FILE *stream = atomic_file_open(&file, self->request->report, out_error);
-        if (!stream) {
-            return error_refused;
+    FILE *stream = NULL;
+    int status = open_page(self, &file, &stream, out_error);
+    if (!status) {
+        // Until all tables are new, a manifest of old ones would name a mixture.
+        unlink(manifest_path(self));
+        status = design_tables(self, out_error);
+        status = status ? status : write_manifest(self, out_error);
+        if (status) {
+            remove_tables(self);
         }
-        start_page(self, stream);
-        self->paged = true;
     }
-    // Until all tables are new, a manifest of old ones would name a mixture.
-    unlink(manifest_path(self));
-    int status = design_tables(self, out_error);
-    status = status ? status : write_manifest(self, out_error);
-    if (status) {
-        remove_tables(self);
+    if (!status && self->paged) {
+        status = write_page(self, stream, out_error);
     }
+    design_report_sequence_free(&self->page);
     if (!self->paged) {
         return status;
     }
@@ -332,8 +352,6 @@ static int design_all(struct work *self, struct error *out_error)
         atomic_file_discard(&file);
         return status;
     }
-    // A write error is kept by the stream, and commit reports it with the path and the reason.
-    (void)page_end(&self->page, "servoscope " SERVOSCOPE_VERSION);
     return atomic_file_commit(&file, out_error);
 }
 
