@@ -4,6 +4,7 @@
  * MPS2 boards, with -icount shift=6; a core's code may run on a bigger core's model, the instructions are the same. */
 #include "core/crc32.h"
 #include "firmware/board.h"
+#include "firmware/counting.h"
 #include "firmware/print.h"
 #include "frf/block.h"
 #include "frf/dft.h"
@@ -21,45 +22,6 @@ enum {
     small_period = 8,
     exact_bins = 32,
 };
-
-static uint32_t overhead; /* of reading the counter twice */
-
-static uint32_t since(uint32_t begin)
-{
-    uint32_t all = board_instructions() - begin;
-    return all > overhead ? all - overhead : 0;
-}
-
-static void calibrate(void)
-{
-    uint32_t least = UINT32_MAX;
-    for (unsigned i = 0; i < 16u; ++i) {
-        uint32_t begin = board_instructions(), all = board_instructions() - begin;
-        least = all < least ? all : least;
-    }
-    overhead = least;
-}
-
-static void keep_most(uint32_t *io_most, uint32_t value)
-{
-    *io_most = value > *io_most ? value : *io_most;
-}
-
-static void print_count(const char *name, uint32_t value)
-{
-    board_print(name);
-    board_print(" ");
-    print_u32(value);
-    board_print("\n");
-}
-
-static void require(enum core_status status)
-{
-    if (status != core_ok) {
-        board_print(core_status_str(status));
-        board_exit(1);
-    }
-}
 
 // ---- Player
 
@@ -85,8 +47,8 @@ static void make_travelling_table(struct msgen_table *out_table)
         data[4u + 4u * i + 3u] = (uint8_t)(i % 2u == 0 ? 0x00u : 0xFFu);
     }
     header.data_crc32 = core_crc32(0, data, 4u + small_period * 3u * 4u);
-    require(msgen_table_encode_header(&header, travelling));
-    require(msgen_table_open(travelling, sizeof travelling, out_table));
+    counting_require(msgen_table_encode_header(&header, travelling));
+    counting_require(msgen_table_open(travelling, sizeof travelling, out_table));
 }
 
 static void count_run(struct msgen_player *player, uint32_t abort_at, uint32_t *io_step, uint32_t *io_abort)
@@ -95,11 +57,11 @@ static void count_run(struct msgen_player *player, uint32_t abort_at, uint32_t *
     for (uint32_t i = 0; i < 400u && player->phase != msgen_phase_done; ++i) {
         uint32_t begin = board_instructions();
         msgen_player_step(player, samples);
-        keep_most(io_step, since(begin));
+        counting_keep_most(io_step, counting_since(begin));
         if (i == abort_at) {
             begin = board_instructions();
             msgen_player_abort(player);
-            keep_most(io_abort, since(begin));
+            counting_keep_most(io_abort, counting_since(begin));
         }
     }
 }
@@ -126,26 +88,26 @@ static void count_player(void)
             }
         }
     }
-    print_count("msgen_player_step", most);
-    print_count("msgen_player_abort", most_abort);
+    counting_print("msgen_player_step", most);
+    counting_print("msgen_player_abort", most_abort);
 
     uint32_t begin = board_instructions();
     enum core_status status = msgen_table_open(excitation_mst, sizeof excitation_mst, &table);
-    print_count("msgen_table_open", since(begin));
-    require(status);
+    counting_print("msgen_table_open", counting_since(begin));
+    counting_require(status);
     config.fade_in_samples = 30u;
     config.approach_samples = config.dwell_samples = 0;
-    require(msgen_player_init(&player, &table, &config));
+    counting_require(msgen_player_init(&player, &table, &config));
     int32_t samples[msgen_channels_max];
     for (uint32_t i = 0; i < 40u; ++i) {
         begin = board_instructions();
         msgen_player_step(&player, samples);
-        most = since(begin);
+        most = counting_since(begin);
     }
-    print_count("msgen_player_step/whole-period", most);
+    counting_print("msgen_player_step/whole-period", most);
     begin = board_instructions();
     volatile uint32_t crc = core_crc32(0, excitation_mst, 1024u);
-    print_count("core_crc32/1024-bytes", since(begin));
+    counting_print("core_crc32/1024-bytes", counting_since(begin));
     (void)crc;
 }
 
@@ -162,31 +124,31 @@ static void count_guard(void)
     for (unsigned i = 0; i < count * count * count; ++i) {
         struct guard_sample sample = {extremes[i % count], extremes[i / count % count], extremes[i / count / count],
                                       i % 7u != 0};
-        require(guard_init(&guard, &limits));
-        require(guard_arm(&guard, &inside));
+        counting_require(guard_init(&guard, &limits));
+        counting_require(guard_arm(&guard, &inside));
         for (unsigned n = 0; n < 3u; ++n) {
             uint32_t begin = board_instructions();
             guard_step(&guard, &sample);
-            keep_most(&most, since(begin));
+            counting_keep_most(&most, counting_since(begin));
             begin = board_instructions();
             guard_clip_torque(&guard, sample.torque);
-            keep_most(&most_clip, since(begin));
+            counting_keep_most(&most_clip, counting_since(begin));
             guard_alive(&guard.state);
         }
     }
     for (unsigned way = 0; way < 2u; ++way) { /* the two causes that take time */
-        require(guard_arm(&guard, &inside));
+        counting_require(guard_arm(&guard, &inside));
         for (unsigned n = 0; n < 60u; ++n) {
             if (way == 0) {
                 guard_alive(&guard.state);
             }
             uint32_t begin = board_instructions();
             guard_step(&guard, &inside);
-            keep_most(&most, since(begin));
+            counting_keep_most(&most, counting_since(begin));
         }
     }
-    print_count("guard_step", most);
-    print_count("guard_clip_torque", most_clip);
+    counting_print("guard_step", most);
+    counting_print("guard_clip_torque", most_clip);
 }
 
 // ---- DFT
@@ -230,8 +192,8 @@ static void count_frames(struct frf_block *dft, uint32_t *out_mean, uint32_t *ou
     for (uint32_t n = 0; n < 2u * period; ++n) {
         uint32_t begin = board_instructions();
         frf_block_add_i16(dft, frame, 1);
-        uint32_t count = since(begin);
-        keep_most(out_longest, count);
+        uint32_t count = counting_since(begin);
+        counting_keep_most(out_longest, count);
         all += count;
     }
     *out_mean = all / (2u * period);
@@ -248,7 +210,7 @@ static uint32_t count_blocks(struct frf_block *dft)
     for (uint32_t n = 0; n < 2u * period; n += block) {
         uint32_t begin = board_instructions();
         frf_block_add_i16(dft, frames, block);
-        all += since(begin);
+        all += counting_since(begin);
     }
     return all / (2u * period);
 }
@@ -263,7 +225,7 @@ static void print_block_count(const char *what, const struct lines *lines, uint3
     print_u32(bin_count);
     board_print("-bins/");
     print_u32(channels);
-    print_count(channels == 1u ? "-channel" : "-channels", value);
+    counting_print(channels == 1u ? "-channel" : "-channels", value);
 }
 
 static void set_up_block(struct frf_block *dft, const struct lines *lines, uint32_t bin_count, uint32_t channels,
@@ -281,9 +243,9 @@ static void set_up_block(struct frf_block *dft, const struct lines *lines, uint3
     for (uint32_t b = 0; b < bin_count; ++b) {
         bins[b] = 1u + b * ((lines->highest - 1u) / (bin_count - 1u) / lines->step) * lines->step;
     }
-    require(frf_block_build(coefficients, sizeof coefficients / sizeof *coefficients, bins, bin_count, lines->period,
-                            &lines->layout, &table));
-    require(frf_block_init(dft, &config));
+    counting_require(frf_block_build(coefficients, sizeof coefficients / sizeof *coefficients, bins, bin_count,
+                                     lines->period, &lines->layout, &table));
+    counting_require(frf_block_init(dft, &config));
 }
 
 /* How even the work is: what the longest call is of the mean one. */
@@ -304,10 +266,10 @@ static void count_reader(struct frf_block *dft)
     int64_t real, imaginary;
     uint32_t begin = board_instructions();
     bool there = frf_block_latest(dft, &latched);
-    print_count("frf_block_latest", since(begin));
+    counting_print("frf_block_latest", counting_since(begin));
     begin = board_instructions();
     frf_block_sums(dft, &latched, bins_max - 1u, channels_max - 1u, &real, &imaginary);
-    print_count("frf_block_sums", since(begin));
+    counting_print("frf_block_sums", counting_since(begin));
     if (!there) {
         board_exit(1);
     }
@@ -323,7 +285,7 @@ static void count_skip(struct frf_block *dft)
     }
     uint32_t begin = board_instructions();
     frf_block_skip(dft, 1);
-    print_count("frf_block_skip/1", since(begin));
+    counting_print("frf_block_skip/1", counting_since(begin));
 }
 
 static void count_block(uint32_t bin_count, uint32_t channels)
@@ -355,7 +317,7 @@ static uint32_t count_exact(struct frf_dft *dft)
     for (uint32_t n = 0; n < EXCITATION_DFT_PERIOD_SAMPLES; ++n) {
         uint32_t begin = board_instructions();
         frf_dft_add_i16(dft, frame, 1);
-        keep_most(&most, since(begin));
+        counting_keep_most(&most, counting_since(begin));
     }
     return most;
 }
@@ -365,23 +327,24 @@ static void count_exact_channels(uint32_t channels)
     const struct frf_dft_config config = {excitation_dft_bins,          exact_bins, channels, words,
                                           sizeof words / sizeof *words, 0,          0};
     struct frf_dft dft;
-    require(frf_dft_init_q15(&dft, &config, &excitation_dft_twiddles_q15));
-    print_count(channels == 1u ? "frf_dft_add_i16/q15/32-bins/1-channel" : "frf_dft_add_i16/q15/32-bins/2-channels",
-                count_exact(&dft));
-    require(frf_dft_init_q31(&dft, &config, &excitation_dft_twiddles_q31));
-    print_count(channels == 1u ? "frf_dft_add_i16/q31/32-bins/1-channel" : "frf_dft_add_i16/q31/32-bins/2-channels",
-                count_exact(&dft));
+    counting_require(frf_dft_init_q15(&dft, &config, &excitation_dft_twiddles_q15));
+    counting_print(channels == 1u ? "frf_dft_add_i16/q15/32-bins/1-channel" : "frf_dft_add_i16/q15/32-bins/2-channels",
+                   count_exact(&dft));
+    counting_require(frf_dft_init_q31(&dft, &config, &excitation_dft_twiddles_q31));
+    counting_print(channels == 1u ? "frf_dft_add_i16/q31/32-bins/1-channel" : "frf_dft_add_i16/q31/32-bins/2-channels",
+                   count_exact(&dft));
 }
 
 int main(void)
 {
     static const uint32_t bin_counts[] = {32, 64, 200};
     board_start_counter();
-    calibrate();
+    counting_calibrate();
     count_guard();
     count_player();
     count_exact_channels(1);
     count_exact_channels(2);
+    counting_exact();
     for (unsigned b = 0; b < sizeof bin_counts / sizeof *bin_counts; ++b) {
         for (uint32_t channels = 1; channels <= channels_max; ++channels) {
             count_block(bin_counts[b], channels);

@@ -53,6 +53,40 @@ def memory(figures):
             + "\n\n" + table(["bytes of", "image", "M0", "M4F"], images))
 
 
+# Of the exact DFT's tables: bytes of an entry, and what tests/unit require of the worst bin at N = 2000, 16384, 65536, dB.
+ENTRY_BYTES = {"q15": 2, "q23": 4, "q31": 4, "f32": 4}
+SAMPLES = (2000, 16384, 65536)
+REQUIRED_DB = {"q15": "100 / 108 / 115", "q23": "141 / 156 / 163", "q31": "190 / 200 / 205", "f32": "125 / 118 / 115"}
+REQUIRED_TWO_LEVEL_DB = {**REQUIRED_DB, "q31": "183 / 186 / 189"}
+
+
+def table_bytes(kind, number, samples):
+    """Of lib/frf/twiddle.h's macros, N being a multiple of 4."""
+    if kind == "full":
+        return samples * 5 // 4 * ENTRY_BYTES[number]
+    if kind == "quarter":
+        return (samples // 4 + 1) * ENTRY_BYTES[number]
+    bits = next(bits for bits, least in ((8, 32768), (7, 8192), (6, 2048), (5, 1024)) if samples >= least)
+    return 8 * -(-samples // 2 ** bits) + (4 if number == "q15" else 8) * 2 ** bits
+
+
+def twiddles(figures):
+    """A sample, bin and channel of 32 bins and two channels, fed in blocks; all of the kernel's object."""
+    rows = []
+    for number in ("q15", "q23", "q31", "f32"):
+        for kind in ("full", "quarter", "two-level"):
+            row = [f"{number}, {kind}"] + [table_bytes(kind, number, samples) for samples in SAMPLES]
+            name = "lib/frf/dft_" + (number if kind == "full" else f"{kind.replace('-', '_')}_{number}") + ".c"
+            row += [figures["flash", name].get(core, "") for core in ("cortex-m0", "cortex-m4f")]
+            for core in ("cortex-m0", "cortex-m4f"):
+                each = {what: instructions(figures, f"frf_dft_add/{number}/{kind}/{what}/32-bins/2-channels", core) / 64
+                        for what in ("in-blocks-mean", "a-frame")}
+                row.append(f"{each['in-blocks-mean']:.1f} / {each['a-frame']:.1f}")
+            rows.append(row + [(REQUIRED_TWO_LEVEL_DB if kind == "two-level" else REQUIRED_DB)[number]])
+    return table(["factors, table", "bytes at N = 2000", "16384", "65536", "code M0", "code M4F", "instructions M0", "M4F",
+                  "worst bin at least, dB"], rows)
+
+
 def headroom(figures):
     """Guard, clip, player and DFT: everything of the library in the interrupt."""
     shared = sum(instructions(figures, name) for name in ("guard_step", "guard_clip_torque", "msgen_player_step/whole-period"))
@@ -99,7 +133,7 @@ def fft(figures):
 
 def write(figures):
     text = PAGE.read_text(encoding="utf-8")
-    for name, make in (("counted", counted), ("memory", memory), ("headroom", headroom), ("fft", fft)):
+    for name, make in (("counted", counted), ("twiddles", twiddles), ("memory", memory), ("headroom", headroom), ("fft", fft)):
         mark = re.compile(rf"(<!-- {name}: .*?-->\n).*?(<!-- end -->)", re.S)
         if not mark.search(text):
             raise SystemExit(f"document: {PAGE.name}: no place for the table '{name}'")

@@ -26,6 +26,8 @@ ROOMS = ["core", "msgen", "frf", "guard"]
 PINNED = "12.2"
 HEAP = re.compile(r"^_?(malloc|calloc|realloc|free|sbrk)(_r)?$")
 FLOAT = re.compile(r"^__aeabi_([df]|[iul]+2[df]|[df]2)|^__(add|sub|mul|div|fix|float)[a-z]*[sd]f")
+# Of the sample path in integers: no floating point in these objects, whatever a program links beside them.
+INTEGER = re.compile(r"lib/(frf/(dft(?!.*f32)|block(_kernel)?\.c)|msgen/player\.c|guard/(guard|latch)\.c|core/)")
 FRAME = {"cortex-m0": 32, "cortex-m3": 32, "cortex-m4f": 104, "cortex-m7": 104}  # what an exception pushes
 
 
@@ -201,6 +203,14 @@ def check_symbols(folder, core):
         failures += [f"{core}: {image.stem}: {name}: expected no heap" for name in names if HEAP.match(name)]
         if core == "cortex-m0" and image.stem == "stream":
             failures += [f"{core}: {image.stem}: {name}: expected no floating point" for name in names if FLOAT.match(name)]
+    objects = [(path, f"lib/{path.parent.name}/{path.name[:-4]}") for path in sorted((folder / core).rglob("lib/*/*.c.obj"))]
+    integer = [(path, name) for path, name in objects if INTEGER.match(name)]
+    if core == "cortex-m0":
+        for path, name in integer:
+            symbols = [line.split()[-1] for line in run("arm-none-eabi-nm", "--undefined-only", path).splitlines() if line.strip()]
+            failures += [f"{core}: {name}: {symbol}: expected no floating point" for symbol in symbols if FLOAT.match(symbol)]
+        if len(integer) < 20:
+            failures.append(f"{core}: {len(integer)} objects of the integer sample path, expected 20 and more")
     return failures
 
 

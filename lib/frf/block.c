@@ -450,8 +450,16 @@ static void begin_period(struct frf_block *self)
     begin_block(self, 0);
 }
 
-/* The block filled is next to be worked on. The work is done a sample before the next block is full, so that taking it
- * over does not come on top. */
+/* What becomes due with each of the `frames` that the next block will be filled in. The work is done a frame before
+ * that, so that taking the next one over does not come on top of it, unless that made two pairs of rows of one. */
+static uint32_t rate_over(const struct frf_block *self, uint32_t frames)
+{
+    uint32_t cost = self->block_cost, pairs = cost / cost_of_rows(self->table.layout.terms / 4u), less = frames - 1u;
+    uint32_t used = (pairs + less - 1u) / less > (pairs + frames - 1u) / frames ? frames : less;
+    return (cost + used - 1u) / used;
+}
+
+/* The block filled is next to be worked on. */
 static void take_block(struct frf_block *self)
 {
     int32_t *filled = self->filling;
@@ -484,8 +492,7 @@ static void complete_block(struct frf_block *self)
         begin_block(self, 0);
     }
     if (worked_on && self->spread) {
-        uint32_t frames = self->end - self->at - 1u;
-        self->run.rate = (self->block_cost + frames - 1u) / frames;
+        self->run.rate = rate_over(self, self->end - self->at);
     } else {
         finish_work(self);
     }

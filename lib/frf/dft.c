@@ -24,13 +24,22 @@ enum core_status frf_check_bins(const uint32_t *bins, uint32_t bin_count, uint32
     return core_ok;
 }
 
-static enum core_status check_rails(const struct frf_dft_config *config, enum frf_number number)
+/* The largest sample; the smallest is one further from 0. */
+static int32_t largest_sample(enum frf_number number)
 {
-    bool has_rails = config->rail_low != 0 || config->rail_high != 0;
-    int32_t low = number == frf_number_q23 ? FRF_I24_MIN : INT16_MIN;
-    int32_t high = number == frf_number_q23 ? FRF_I24_MAX : INT16_MAX;
-    bool in_order = low <= config->rail_low && config->rail_low < config->rail_high && config->rail_high <= high;
-    return has_rails && !in_order ? core_err_frf_rails : core_ok;
+    return number == frf_number_q23 ? FRF_I24_MAX : INT16_MAX;
+}
+
+static bool has_rails(const struct frf_dft_config *config)
+{
+    return config->rail_low != 0 || config->rail_high != 0;
+}
+
+static enum core_status check_rails(const struct frf_dft_config *config, int32_t largest)
+{
+    bool in_order = config->rail_low < config->rail_high;
+    bool fit = config->rail_low >= -largest - 1 && config->rail_high <= largest;
+    return has_rails(config) && !(in_order && fit) ? core_err_frf_rails : core_ok;
 }
 
 static enum core_status check_config(const struct frf_dft_config *config, uint32_t period, enum frf_number number)
@@ -51,7 +60,7 @@ static enum core_status check_config(const struct frf_dft_config *config, uint32
     if (config->storage_words < FRF_STORAGE_WORDS(config->bin_count, config->channels)) {
         return core_err_storage;
     }
-    return check_rails(config, number);
+    return check_rails(config, largest_sample(number));
 }
 
 enum core_status frf_dft_set_up(struct frf_dft *self, const struct frf_dft_config *config, uint32_t period_samples,
@@ -67,7 +76,6 @@ enum core_status frf_dft_set_up(struct frf_dft *self, const struct frf_dft_confi
     uint32_t bin_words = (config->bin_count + 1u) / 2u;
     uint32_t pairs = config->bin_count * config->channels;
     uint32_t bank_words = number == frf_number_f32 ? pairs : 2u * pairs;
-    bool has_rails = config->rail_low != 0 || config->rail_high != 0;
     self->bins = config->storage;
     self->banks[0] = config->storage + bin_words;
     self->banks[1] = self->banks[0] + bank_words;
@@ -77,8 +85,8 @@ enum core_status frf_dft_set_up(struct frf_dft *self, const struct frf_dft_confi
     self->period_samples = period_samples;
     self->bin_count = config->bin_count;
     self->channels = config->channels;
-    self->rail_low = has_rails ? config->rail_low : number == frf_number_q23 ? FRF_I24_MIN : INT16_MIN;
-    self->rail_high = has_rails ? config->rail_high : number == frf_number_q23 ? FRF_I24_MAX : INT16_MAX;
+    self->rail_low = has_rails(config) ? config->rail_low : -largest_sample(number) - 1;
+    self->rail_high = has_rails(config) ? config->rail_high : largest_sample(number);
     self->sequence = 0;
     self->latched_reasons[0] = self->latched_reasons[1] = 0;
     self->err.lost = self->err.saturated = self->err.late = self->err.not_finite = self->err.wrong_type = 0;

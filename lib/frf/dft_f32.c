@@ -3,15 +3,15 @@
 #include "core/fixed.h"
 #include "frf/dft.h"
 
+#define FRF_TABLE  struct frf_twiddles_f32
+#define FRF_MEMBER f32
+#include "frf/dft_float.h"
+
 static inline void look_up(const struct frf_twiddles_f32 *table, uint32_t index, float *out_cosine, float *out_sine)
 {
     *out_cosine = table->cosine[index];
     *out_sine = table->sine[index];
 }
-
-#define FRF_TABLE  struct frf_twiddles_f32
-#define FRF_MEMBER f32
-#include "frf/dft_float.h"
 
 static bool frame_is_finite(const float *frame, uint32_t channels)
 {

@@ -2,11 +2,14 @@
 /* The float variants' loop, not a header of its own: dft_*f32.c include it, each once, having defined
  *   FRF_TABLE   the type of the table
  *   FRF_MEMBER  its member of struct frf_dft's twiddles
- *   look_up()   the two factors of an angle
- * Products are summed in partial sums of SERVOSCOPE_FRF_BLOCK samples, and these into the total: rounding then grows
- * with the block and with the number of blocks, not with the period. Blocks begin at multiples of their length within
- * the period wherever the caller cuts, so the cut does not change a bit of the result. */
+ * and defines look_up() after it. Products are summed in partial sums of SERVOSCOPE_FRF_BLOCK samples, and these into
+ * the total: rounding then grows with the block and with the number of blocks, not with the period. Blocks begin at
+ * multiples of their length within the period wherever the caller cuts, so the cut does not change a bit of the
+ * result. */
 #include "frf/kernel.h"
+
+/* The two factors of an angle. */
+static inline void look_up(const FRF_TABLE *table, uint32_t index, float *out_cosine, float *out_sine);
 
 static inline void accumulate(union frf_word *partial, const float *frames, uint32_t channels, float cosine, float sine)
 {

@@ -4,8 +4,11 @@
  *   FRF_MEMBER  its member of struct frf_dft's twiddles
  *   FRF_SAMPLE  the type of a sample
  *   FRF_FACTOR  the type in which a sample and a factor are multiplied without overflow
- *   look_up()   the two factors of an angle */
+ * and defines look_up() after it. */
 #include "frf/kernel.h"
+
+/* The two factors of an angle. */
+static inline void look_up(const FRF_TABLE *table, uint32_t index, FRF_FACTOR *out_cosine, FRF_FACTOR *out_sine);
 
 /* One bin over one piece; returns the index after it. `channels` is a constant at every call but the last, so that the
  * sums stay in registers. The imaginary part is summed with the opposite sign because multiply-accumulate instructions

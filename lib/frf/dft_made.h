@@ -5,12 +5,14 @@
  *   FRF_MEMBER   its member of struct frf_dft's twiddles
  *   FRF_SAMPLE   the type of a sample
  *   FRF_PRODUCT  the type in which a sample and a factor are multiplied without overflow
- *   look_up()    the two factors of an angle
- * Factors are made for some samples ahead, then used: at a time either is more than the registers of these cores hold,
- * and the channels share what was made. */
+ * and defines look_up() after it. Factors are made for some samples ahead, then used: both at a time are more than the
+ * registers of these cores hold, and the channels share what was made. */
 #include "frf/kernel.h"
 
-enum { made_at_once = 32 };
+enum { made_at_once = 16 };
+
+/* The two factors of an angle. */
+static inline struct frf_point look_up(const FRF_TABLE *table, uint32_t index);
 
 /* Returns the index after the last. */
 static inline uint32_t make_factors(const FRF_TABLE *table, uint32_t step, uint32_t index, uint32_t count,
@@ -47,7 +49,10 @@ static void add(struct frf_dft *self, const void *frames, uint32_t count, bool f
         uint32_t step = bin->bins[b % 2u].step, index = bin->bins[b % 2u].index;
         for (uint32_t at = 0; at < count; at += made_at_once) {
             const FRF_SAMPLE *samples = (const FRF_SAMPLE *)frames + at * self->channels;
-            uint32_t piece = count - at < made_at_once ? count - at : made_at_once;
+            uint32_t piece = count - at;
+            if (piece > made_at_once) {
+                piece = made_at_once;
+            }
             index = make_factors(&table, step, index, piece, factors);
             for (uint32_t c = 0; c < self->channels; ++c) {
                 accumulate(sums + 2u * c, factors, samples + c, self->channels, piece, fresh && at == 0);

@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 #include "frf/dft.h"
 
-static inline void look_up(const struct frf_twiddles_q15 *table, uint32_t index, int32_t *out_cosine, int32_t *out_sine)
-{
-    *out_cosine = table->cosine[index];
-    *out_sine = table->sine[index];
-}
-
 #define FRF_TABLE  struct frf_twiddles_q15
 #define FRF_MEMBER q15
 #define FRF_SAMPLE int16_t
 #define FRF_FACTOR int32_t
 #include "frf/dft_by_twos.h"
 #include "frf/dft_integer.h"
+
+static inline void look_up(const struct frf_twiddles_q15 *table, uint32_t index, int32_t *out_cosine, int32_t *out_sine)
+{
+    *out_cosine = table->cosine[index];
+    *out_sine = table->sine[index];
+}
 
 /* |sum| <= 2^15 * (2^15 - 1) * N: has to stay below 2^63. */
 CORE_STATIC_ASSERT((uint64_t)SERVOSCOPE_FRF_PERIOD_MAX <= ((uint64_t)1 << 62) >> (15 + 15),

@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 #include "frf/dft.h"
 
-static inline void look_up(const struct frf_twiddles_q31 *table, uint32_t index, int64_t *out_cosine, int64_t *out_sine)
-{
-    *out_cosine = table->cosine[index];
-    *out_sine = table->sine[index];
-}
-
 #define FRF_TABLE  struct frf_twiddles_q31
 #define FRF_MEMBER q31
 #define FRF_SAMPLE int16_t
 #define FRF_FACTOR int64_t
 #include "frf/dft_integer.h"
+
+static inline void look_up(const struct frf_twiddles_q31 *table, uint32_t index, int64_t *out_cosine, int64_t *out_sine)
+{
+    *out_cosine = table->cosine[index];
+    *out_sine = table->sine[index];
+}
 
 /* |sum| <= 2^15 * (2^31 - 1) * N: has to stay below 2^63. */
 CORE_STATIC_ASSERT((uint64_t)SERVOSCOPE_FRF_PERIOD_MAX <= ((uint64_t)1 << 62) >> (15 + 31),

@@ -2,6 +2,10 @@
 #include "frf/dft.h"
 #include "frf/quarter.h"
 
+#define FRF_TABLE  struct frf_quarter_f32
+#define FRF_MEMBER quarter_f32
+#include "frf/dft_float.h"
+
 static inline void look_up(const struct frf_quarter_f32 *table, uint32_t index, float *out_cosine, float *out_sine)
 {
     struct frf_quarter_place place = frf_quarter_place(index * table->sample_steps, table->quarter_steps);
@@ -9,10 +13,6 @@ static inline void look_up(const struct frf_quarter_f32 *table, uint32_t index, 
     *out_cosine = place.minus_cosine ? -cosine : cosine;
     *out_sine = place.minus_sine ? -sine : sine;
 }
-
-#define FRF_TABLE  struct frf_quarter_f32
-#define FRF_MEMBER quarter_f32
-#include "frf/dft_float.h"
 
 enum core_status frf_dft_init_quarter_f32(struct frf_dft *self, const struct frf_dft_config *config,
                                           const struct frf_quarter_f32 *quarter)

@@ -2,15 +2,6 @@
 #include "frf/dft.h"
 #include "frf/quarter.h"
 
-static inline struct frf_point look_up(const struct frf_quarter_q15 *table, uint32_t index)
-{
-    struct frf_quarter_place place = frf_quarter_place(index * table->sample_steps, table->quarter_steps);
-    struct frf_point factor = {table->sine[place.cosine], table->sine[place.sine]};
-    factor.cosine = place.minus_cosine ? -factor.cosine : factor.cosine;
-    factor.sine = place.minus_sine ? -factor.sine : factor.sine;
-    return factor;
-}
-
 #define FRF_TABLE  struct frf_quarter_q15
 #define FRF_MEMBER quarter_q15
 #define FRF_SAMPLE int16_t
@@ -20,6 +11,15 @@ static inline struct frf_point look_up(const struct frf_quarter_q15 *table, uint
 #define FRF_PRODUCT int32_t
 #endif
 #include "frf/dft_made.h"
+
+static inline struct frf_point look_up(const struct frf_quarter_q15 *table, uint32_t index)
+{
+    struct frf_quarter_place place = frf_quarter_place(index * table->sample_steps, table->quarter_steps);
+    struct frf_point factor = {table->sine[place.cosine], table->sine[place.sine]};
+    factor.cosine = place.minus_cosine ? -factor.cosine : factor.cosine;
+    factor.sine = place.minus_sine ? -factor.sine : factor.sine;
+    return factor;
+}
 
 /* The same factors, so the same bound. */
 CORE_STATIC_ASSERT((uint64_t)SERVOSCOPE_FRF_PERIOD_MAX <= ((uint64_t)1 << 62) >> (15 + 15),

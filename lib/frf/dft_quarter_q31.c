@@ -2,6 +2,12 @@
 #include "frf/dft.h"
 #include "frf/quarter.h"
 
+#define FRF_TABLE   struct frf_quarter_q31
+#define FRF_MEMBER  quarter_q31
+#define FRF_SAMPLE  int16_t
+#define FRF_PRODUCT int64_t
+#include "frf/dft_made.h"
+
 static inline struct frf_point look_up(const struct frf_quarter_q31 *table, uint32_t index)
 {
     struct frf_quarter_place place = frf_quarter_place(index * table->sample_steps, table->quarter_steps);
@@ -10,12 +16,6 @@ static inline struct frf_point look_up(const struct frf_quarter_q31 *table, uint
     factor.sine = place.minus_sine ? -factor.sine : factor.sine;
     return factor;
 }
-
-#define FRF_TABLE   struct frf_quarter_q31
-#define FRF_MEMBER  quarter_q31
-#define FRF_SAMPLE  int16_t
-#define FRF_PRODUCT int64_t
-#include "frf/dft_made.h"
 
 /* The same factors, so the same bound. */
 CORE_STATIC_ASSERT((uint64_t)SERVOSCOPE_FRF_PERIOD_MAX <= ((uint64_t)1 << 62) >> (15 + 31),

@@ -2,6 +2,10 @@
 #include "frf/dft.h"
 #include "frf/two_level.h"
 
+#define FRF_TABLE  struct frf_two_level_f32
+#define FRF_MEMBER two_level_f32
+#include "frf/dft_float.h"
+
 static inline void look_up(const struct frf_two_level_f32 *table, uint32_t index, float *out_cosine, float *out_sine)
 {
     const struct frf_point_f32 *coarse = &table->coarse[index >> table->group_bits];
@@ -9,10 +13,6 @@ static inline void look_up(const struct frf_two_level_f32 *table, uint32_t index
     *out_cosine = coarse->cosine - (coarse->cosine * turn->less + coarse->sine * turn->sine);
     *out_sine = coarse->sine - (coarse->sine * turn->less - coarse->cosine * turn->sine);
 }
-
-#define FRF_TABLE  struct frf_two_level_f32
-#define FRF_MEMBER two_level_f32
-#include "frf/dft_float.h"
 
 enum core_status frf_dft_init_two_level_f32(struct frf_dft *self, const struct frf_dft_config *config,
                                             const struct frf_two_level_f32 *table)

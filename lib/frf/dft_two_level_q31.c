@@ -2,17 +2,17 @@
 #include "frf/dft.h"
 #include "frf/two_level.h"
 
-static inline struct frf_point look_up(const struct frf_two_level_q31 *table, uint32_t index)
-{
-    uint32_t bits = table->group_bits;
-    return frf_two_level_factor_q31(&table->coarse[index >> bits], &table->fine[index & ((1u << bits) - 1u)]);
-}
-
 #define FRF_TABLE   struct frf_two_level_q31
 #define FRF_MEMBER  two_level_q31
 #define FRF_SAMPLE  int16_t
 #define FRF_PRODUCT int64_t
 #include "frf/dft_made.h"
+
+static inline struct frf_point look_up(const struct frf_two_level_q31 *table, uint32_t index)
+{
+    uint32_t bits = table->group_bits;
+    return frf_two_level_factor_q31(&table->coarse[index >> bits], &table->fine[index & ((1u << bits) - 1u)]);
+}
 
 /* Whatever the table holds a factor is at most 2^31, so |sum| <= 2^15 2^31 N: has to stay below 2^63. */
 CORE_STATIC_ASSERT((uint64_t)SERVOSCOPE_FRF_PERIOD_MAX <= ((uint64_t)1 << 62) >> (15 + 31),

@@ -19,15 +19,18 @@ static inline uint32_t frf_group_bits(uint32_t period)
     return FRF_GROUP_BITS(period);
 }
 
-/* Q31 by Q34, the upper word: what is taken off, in Q33. |turn| < 0.1 2^34, so the sum stays below 2^62. */
-static inline int32_t frf_off_cosine_q33(const struct frf_point *coarse, const struct frf_turn *turn)
+/* Q31 by Q34 and the upper word of it: what is taken off, in Q33, plus `more` of Q33. |turn| < 0.1 2^34, so that the sum
+ * stays below 2^63. */
+static inline int32_t frf_off_cosine_q33(const struct frf_point *coarse, const struct frf_turn *turn, int32_t more)
 {
-    return core_high_word_i64((int64_t)coarse->cosine * turn->less + (int64_t)coarse->sine * turn->sine);
+    int64_t sum = (int64_t)coarse->cosine * turn->less + (int64_t)coarse->sine * turn->sine;
+    return core_high_word_i64(sum + more * ((int64_t)1 << 32));
 }
 
-static inline int32_t frf_off_sine_q33(const struct frf_point *coarse, const struct frf_turn *turn)
+static inline int32_t frf_off_sine_q33(const struct frf_point *coarse, const struct frf_turn *turn, int32_t more)
 {
-    return core_high_word_i64((int64_t)coarse->sine * turn->less - (int64_t)coarse->cosine * turn->sine);
+    int64_t sum = (int64_t)coarse->sine * turn->less - (int64_t)coarse->cosine * turn->sine;
+    return core_high_word_i64(sum + more * ((int64_t)1 << 32));
 }
 
 /* minuend - subtrahend / 4 + half, the quarter rounded down */
@@ -39,8 +42,8 @@ static inline int32_t frf_minus_quarter(int32_t minuend, int32_t subtrahend, uin
 static inline struct frf_point frf_two_level_factor_q31(const struct frf_point *coarse, const struct frf_turn *turn)
 {
     struct frf_point factor;
-    factor.cosine = frf_minus_quarter(coarse->cosine, frf_off_cosine_q33(coarse, turn) + 2, 0);
-    factor.sine = frf_minus_quarter(coarse->sine, frf_off_sine_q33(coarse, turn) + 2, 0);
+    factor.cosine = frf_minus_quarter(coarse->cosine, frf_off_cosine_q33(coarse, turn, 2), 0);
+    factor.sine = frf_minus_quarter(coarse->sine, frf_off_sine_q33(coarse, turn, 2), 0);
     return factor;
 }
 
@@ -49,8 +52,8 @@ static inline struct frf_point frf_two_level_factor_q23(const struct frf_point *
 {
     struct frf_point factor;
     factor.cosine =
-        core_shift_down_i32(frf_minus_quarter(coarse->cosine, frf_off_cosine_q33(coarse, turn), 1u << 7), 8);
-    factor.sine = core_shift_down_i32(frf_minus_quarter(coarse->sine, frf_off_sine_q33(coarse, turn), 1u << 7), 8);
+        core_shift_down_i32(frf_minus_quarter(coarse->cosine, frf_off_cosine_q33(coarse, turn, 0), 128u), 8);
+    factor.sine = core_shift_down_i32(frf_minus_quarter(coarse->sine, frf_off_sine_q33(coarse, turn, 0), 128u), 8);
     return factor;
 }
 
@@ -62,8 +65,8 @@ static inline struct frf_point frf_two_level_factor_q15(const struct frf_point *
     int32_t off_cosine = cosine * turn->less + sine * turn->sine;
     int32_t off_sine = sine * turn->less - cosine * turn->sine;
     struct frf_point factor;
-    factor.cosine = core_shift_down_i32(frf_minus_quarter(coarse->cosine, off_cosine, 1u << 15), 16);
-    factor.sine = core_shift_down_i32(frf_minus_quarter(coarse->sine, off_sine, 1u << 15), 16);
+    factor.cosine = core_shift_down_i32(frf_minus_quarter(coarse->cosine, off_cosine, 32768u), 16);
+    factor.sine = core_shift_down_i32(frf_minus_quarter(coarse->sine, off_sine, 32768u), 16);
     return factor;
 }
 
