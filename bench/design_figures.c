@@ -49,8 +49,8 @@ static struct design_limits limits_of(int kind, double corner_hz)
 
 static struct design_request request_of(int kind, double corner_hz)
 {
-    return (struct design_request){.rate_numerator_hz = rate_hz,
-                                   .rate_denominator = 1,
+    return (struct design_request){.rate_num_hz = rate_hz,
+                                   .rate_den = 1,
                                    .period_samples = period_samples,
                                    .bin_count = line_count,
                                    .bins = bins,

@@ -68,7 +68,7 @@ host, m4, m0 = read("host"), read("cortex-m4"), read("cortex-m0plus")
 failures = report("Cortex-M4", m4, REQUIRED_M4)
 failures += report("Cortex-M0+", {key: row for key, row in m0.items() if key[0].startswith("exact")}, REQUIRED_M0)
 print("\nblocks: a period fed at once; frames: fed frame by frame, the call included; longest: instructions of the longest call of "
-      "one frame;\nspread: the same with the work spread over the next block. Line sets: 'any' below 0.45 of the sampling rate.")
+      "one frame;\nspread: the same with the work spread over the next block. Line sets: 'any' below 0.45 of the sample rate.")
 sizes = subprocess.run(["arm-none-eabi-nm", "--print-size", "--size-sort", folder / "cortex-m4.elf"], check=True, capture_output=True,
                        text=True).stdout
 code = sum(int(line.split()[1], 16) for line in sizes.splitlines() if line.split()[-1].startswith("frf_block")

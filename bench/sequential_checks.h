@@ -46,11 +46,11 @@ bool sequential_distortion(const char *lines, const struct cubic_plant *plant, d
 
 /// Products that fall on lines L .. 2L-1 when all of them are excited.
 struct sequential_products {
-    size_t second_order;      ///< lines hit by 2 f, f1 + f2, f1 - f2
-    size_t third_harmonics;   ///< hit by 3 f
-    size_t second_inclusive;  ///< second_order of L .. 2L, the upper edge closed
-    size_t triples;           ///< ordered (f1, f2, f3) with f1 + f2 - f3 in the band
-    size_t trivial;           ///< of those, f3 = f1 or f2: in phase with the line, it changes the gain
+    size_t second_order;     ///< lines hit by 2 f, f1 + f2, f1 - f2
+    size_t third_harmonics;  ///< hit by 3 f
+    size_t second_inclusive; ///< second_order of L .. 2L, the upper edge closed
+    size_t triples;          ///< ordered (f1, f2, f3) with f1 + f2 - f3 in the band
+    size_t trivial;          ///< of those, f3 = f1 or f2: in phase with the line, it changes the gain
 };
 
 /// Errors: false if memory is short

@@ -23,8 +23,8 @@ static bool choose_schroeder(const struct sequential_segment *segment, double *o
     for (size_t k = 0; flat && k < segment->line_count; k++) {
         flat[k] = 1.0;
     }
-    const struct design_request request = {.rate_numerator_hz = sequential_rate_hz,
-                                           .rate_denominator = 1,
+    const struct design_request request = {.rate_num_hz = sequential_rate_hz,
+                                           .rate_den = 1,
                                            .period_samples = sequential_samples,
                                            .bin_count = segment->line_count,
                                            .bins = segment->bins,

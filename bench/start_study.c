@@ -71,8 +71,8 @@ static int make_design(const struct wish *wish, struct design_result *out_result
         bins[count++] = bin;
     }
     const struct design_request request = {
-        .rate_numerator_hz = rate_hz,
-        .rate_denominator = 1,
+        .rate_num_hz = rate_hz,
+        .rate_den = 1,
         .period_samples = period,
         .bin_count = count,
         .bins = bins,

@@ -153,7 +153,7 @@ static void count_guard(void)
 
 // ---- DFT
 
-/* What there are lines for: anywhere, in whole blocks and not; well below the sampling rate, where they share a basis;
+/* What there are lines for: anywhere, in whole blocks and not; well below the sample rate, where they share a basis;
  * odd ones, where the period is folded. */
 struct lines {
     const char *name;

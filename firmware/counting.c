@@ -4,22 +4,16 @@
 #include "firmware/board.h"
 #include "firmware/print.h"
 
-static uint32_t overhead; /* of reading the counter twice, 0 until it is known */
-
-uint32_t counting_since(uint32_t begin)
-{
-    uint32_t all = board_instructions() - begin;
-    return all > overhead ? all - overhead : 0;
-}
+uint32_t counting_overhead;
 
 void counting_calibrate(void)
 {
     uint32_t least = UINT32_MAX;
     for (unsigned i = 0; i < 16u; ++i) {
-        uint32_t all = counting_since(board_instructions());
+        uint32_t begin = board_instructions(), all = board_instructions() - begin;
         least = all < least ? all : least;
     }
-    overhead = least;
+    counting_overhead = least;
 }
 
 void counting_keep_most(uint32_t *io_most, uint32_t value)

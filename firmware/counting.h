@@ -4,14 +4,22 @@
 #define SERVOSCOPE_FIRMWARE_COUNTING_H
 
 #include "core/status.h"
+#include "firmware/board.h"
 
 #include <stdint.h>
 
-/// Measures what reading the counter costs; before all else.
+extern uint32_t counting_overhead; ///< of reading the counter twice
+
+/// Measures it; before all else.
 void counting_calibrate(void);
 
-/// Instructions since board_instructions() gave `begin`, without what reading the counter takes.
-uint32_t counting_since(uint32_t begin);
+/// Instructions since board_instructions() gave `begin`, without the overhead. Part of its caller, or its own call
+/// would be counted.
+static inline uint32_t counting_since(uint32_t begin)
+{
+    uint32_t all = board_instructions() - begin;
+    return all > counting_overhead ? all - counting_overhead : 0;
+}
 
 void counting_keep_most(uint32_t *io_most, uint32_t value);
 

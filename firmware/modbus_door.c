@@ -283,7 +283,6 @@ static void keep_spectrum(struct modbus_door *self)
 {
     const struct modbus_line *line = &self->to_master;
     uint32_t count = word_at(line, 5);
-    self->read_validity = word_at(line, 1);
     self->read_count = word_at(line, 6) << 16 | word_at(line, 7);
     for (uint32_t i = 0; i < count && self->bins_read < results_bins_max; ++i, ++self->bins_read) {
         struct modbus_record *record = &self->readings[self->bins_read];

@@ -26,7 +26,7 @@ struct modbus_door {
     bool waiting; ///< for a reply
     uint32_t requests, refused;
     struct modbus_record readings[results_bins_max]; ///< what the master has read
-    uint32_t bins_read, read_count, read_validity;
+    uint32_t bins_read, read_count;
 };
 
 /// Errors: those of modbus_map_init()

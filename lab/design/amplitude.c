@@ -17,7 +17,7 @@ static const double two_pi = 6.283185307179586;
 
 static double line_hz(const struct design_request *request)
 {
-    return (double)request->rate_numerator_hz / request->rate_denominator / (double)request->period_samples;
+    return (double)request->rate_num_hz / request->rate_den / (double)request->period_samples;
 }
 
 static int out_of_memory(struct error *out_error)

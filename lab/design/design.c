@@ -57,9 +57,9 @@ static int check_search(const struct design_request *request, struct error *out_
 
 static int check_lines(const struct design_request *request, struct error *out_error)
 {
-    if (request->rate_numerator_hz == 0 || request->rate_denominator == 0) {
-        return error_set(out_error, error_usage, "rate: %u/%u Hz, expected both to be positive",
-                         request->rate_numerator_hz, request->rate_denominator);
+    if (request->rate_num_hz == 0 || request->rate_den == 0) {
+        return error_set(out_error, error_usage, "rate: %u/%u Hz, expected both to be positive", request->rate_num_hz,
+                         request->rate_den);
     }
     if (request->period_samples < 4 || request->period_samples > design_period_samples_max) {
         return error_set(out_error, error_usage, "period: %zu samples, expected 4 to %d", request->period_samples,

@@ -49,8 +49,8 @@ struct design_limits {
 };
 
 struct design_request {
-    uint32_t rate_numerator_hz; ///< sample rate = numerator / denominator
-    uint32_t rate_denominator;
+    uint32_t rate_num_hz; ///< sample rate = numerator / denominator
+    uint32_t rate_den;
     size_t period_samples; ///< 4 .. design_period_samples_max
     size_t bin_count;
     const uint32_t *bins; ///< excited lines in units of rate / period_samples, ascending, 1 .. (N - 1) / 2

@@ -2,7 +2,7 @@
 /// Where a nonlinearity of the drive puts what it makes of the lines: which harmonics and products of second and third
 /// order fall on excited lines again, where they pass for the drive's response, and which bins stay free to show them.
 /// Products are counted as frequencies: |f1 - f2|, |2 f1 - f2| and |f1 + f2 - f3| are folded at zero, what falls on
-/// zero is not counted. Folding at half the sampling rate is left out, as if all that lies above it were filtered away.
+/// zero is not counted. Folding at half the sample rate is left out, as if all that lies above it were filtered away.
 #ifndef SERVOSCOPE_DESIGN_INTERMODULATION_H
 #define SERVOSCOPE_DESIGN_INTERMODULATION_H
 

@@ -30,8 +30,7 @@ static size_t repetitions(const struct design_offset *self)
 
 static double table_period_s(const struct design_offset *self, const struct design_request *request)
 {
-    return (double)repetitions(self) * (double)request->period_samples * request->rate_denominator /
-           request->rate_numerator_hz;
+    return (double)repetitions(self) * (double)request->period_samples * request->rate_den / request->rate_num_hz;
 }
 
 static int check_stroke(const struct design_offset *self, const struct design_request *request, struct error *out_error)
@@ -55,7 +54,7 @@ static int check_stroke(const struct design_offset *self, const struct design_re
 static int check_offset(const struct design_offset *self, const struct design_request *request, struct error *out_error)
 {
     const char *unit = request->linear ? "m/s" : "rad/s";
-    if (request->rate_numerator_hz == 0 || request->rate_denominator == 0 || request->period_samples == 0 ||
+    if (request->rate_num_hz == 0 || request->rate_den == 0 || request->period_samples == 0 ||
         request->bin_count == 0 || !request->bins || request->bins[0] == 0) {
         return error_set(out_error, error_usage, "stroke and bias velocity: expected a rate, a period and lines first");
     }

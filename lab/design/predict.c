@@ -395,7 +395,7 @@ static int check_model(const struct sim_model *model, const struct design_reques
                        const struct design_predict_plan *plan, struct error *out_error)
 {
     char text[160];
-    const double rate_hz = (double)request->rate_numerator_hz / request->rate_denominator;
+    const double rate_hz = (double)request->rate_num_hz / request->rate_den;
     const char *wrong = sim_model_check(model, text, sizeof text);
     if (plan->periods == 0) {
         return error_set(out_error, error_usage, "predicted deviation: 0 periods, expected at least 1");

@@ -46,7 +46,7 @@ static const char *start_reason(enum design_start start)
 static void add_period(struct page *page, const struct design_request *request, const struct design_result *result,
                        const struct report_row *rows, double *values)
 {
-    const double step_s = (double)request->rate_denominator / request->rate_numerator_hz;
+    const double step_s = (double)request->rate_den / request->rate_num_hz;
     const size_t period = result->period_samples;
     const size_t points = period + 1;
     struct figure figure;
@@ -267,7 +267,7 @@ static void add_start_map(struct page *page, const struct design_request *reques
                           double *values)
 {
     const size_t period = result->period_samples;
-    const double step_s = (double)request->rate_denominator / request->rate_numerator_hz;
+    const double step_s = (double)request->rate_den / request->rate_num_hz;
     double *time_s = values, *percent = values + period, *sorted = values + 2 * period;
     if (!design_start_shares(request, result, percent)) {
         return;
@@ -328,7 +328,7 @@ static void add_excitation(struct page *page, const struct design_request *reque
 
 void design_report_sections(struct page *page, const struct design_request *request, const struct design_result *result)
 {
-    const double rate_hz = (double)request->rate_numerator_hz / request->rate_denominator;
+    const double rate_hz = (double)request->rate_num_hz / request->rate_den;
     const double line_hz = rate_hz / (double)result->period_samples;
     // The lines fit too: there are fewer than half as many of them as samples.
     double *values = malloc((report_rows + 1) * (result->period_samples + 1) * sizeof *values);

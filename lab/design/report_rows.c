@@ -50,7 +50,7 @@ void report_rows_make(const struct design_request *request, const struct design_
 void report_rows_amplitudes(const struct design_request *request, const struct design_result *result,
                             double *out_frequency_hz, double *out_torque_Nm, double *out_velocity_rad_per_s)
 {
-    const double rate_hz = (double)request->rate_numerator_hz / request->rate_denominator;
+    const double rate_hz = (double)request->rate_num_hz / request->rate_den;
     const double line_hz = rate_hz / (double)result->period_samples;
     for (size_t k = 0; k < result->bin_count; k++) {
         const double omega = two_pi * line_hz * result->bins[k];

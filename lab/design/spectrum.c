@@ -25,7 +25,7 @@ bool design_spectrum_create(const struct design_request *request, struct design_
         design_spectrum_free(&spectrum);
         return false;
     }
-    double line_hz = (double)request->rate_numerator_hz / request->rate_denominator / (double)request->period_samples;
+    double line_hz = (double)request->rate_num_hz / request->rate_den / (double)request->period_samples;
     for (size_t k = 0; k < request->bin_count; k++) {
         double omega = two_pi * line_hz * request->bins[k];
         spectrum.omega_rad_per_s[k] = omega;

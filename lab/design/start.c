@@ -10,7 +10,7 @@ static const double same_rate = 1e-9;
 
 static int check_model(const struct design_request *request, struct error *out_error)
 {
-    const double rate_hz = (double)request->rate_numerator_hz / request->rate_denominator;
+    const double rate_hz = (double)request->rate_num_hz / request->rate_den;
     if (!request->start_model) {
         return error_set(out_error, error_usage, "start: no model is given, expected one");
     }
@@ -24,7 +24,7 @@ static int check_model(const struct design_request *request, struct error *out_e
 static struct design_transient_table table_of(const struct design_request *request, const struct design_result *result)
 {
     return (struct design_transient_table){
-        .rate_hz = (double)request->rate_numerator_hz / request->rate_denominator,
+        .rate_hz = (double)request->rate_num_hz / request->rate_den,
         .period_samples = result->period_samples,
         .line_count = result->bin_count,
         .bins = result->bins,

@@ -33,7 +33,8 @@ struct work {
     struct fit fit;
     struct search_memo memo; ///< of fit_data
     struct cause_gain gains[sim_effects_max];
-    struct repeat repeat; ///< of the fit's parameters, on the validation data
+    struct repeat repeat;                 ///< of the fit's parameters, on the validation data
+    double own_evidence[sim_effects_max]; ///< of hidden masses, with and without each with its own noise; 0: not known
 };
 
 static void work_free(struct work *w)
@@ -415,7 +416,7 @@ static bool drop_hidden_mass(struct work *w, struct hypothesis *h, struct sim_mo
 {
     if (!fit_hidden_mass(w, h, io_model))
         return false;
-    double credible = hidden_mass_credible_cost(&w->fit_data, w->fit.cost), least = INFINITY;
+    double cost = w->fit.cost, credible = hidden_mass_credible_cost(&w->fit_data, cost), least = INFINITY;
     struct hypothesis best = *h;
     struct sim_model best_model = *io_model;
     for (int e = 0; sim_effects[e]; e++) {
@@ -427,6 +428,7 @@ static bool drop_hidden_mass(struct work *w, struct hypothesis *h, struct sim_mo
         hypothesis_model(&without, NULL, &model);
         if (!fit_anew(w, &without, &model) || !fit_anew(w, &without, &model))
             return false;
+        w->own_evidence[e] = 0.5 * (w->fit.cost - cost);
         double missed = w->fit.cost - credible - 2.0 * search_threshold(&w->fit_data, e);
         if (missed < fmin(least, 0.0)) {
             least = missed;
@@ -556,7 +558,8 @@ static void describe_cause(const struct work *w, const struct diagnosis *d, cons
     const struct sim_effect *e = sim_effects[effect];
     memset(out, 0, sizeof *out);
     out->effect = effect;
-    out->evidence = search_evidence(&w->fit_data, h, &w->fit, effect);
+    out->evidence =
+        w->own_evidence[effect] > 0.0 ? w->own_evidence[effect] : search_evidence(&w->fit_data, h, &w->fit, effect);
     out->gain = w->gains[effect];
     hypothesis_parameters(h, effect, w->fit.covariance, out->values, out->deviations);
     for (size_t i = 0; i < e->parameter_count; i++)
@@ -568,8 +571,8 @@ static void describe_cause(const struct work *w, const struct diagnosis *d, cons
     wording_in_units(d, sizeof out->says, out->says);
 }
 
-/// What is nowhere larger than twice its own deviation is no claim, however much of the error it takes; nor is what does
-/// harm on unseen data.
+/// What is nowhere larger than twice its own deviation is no claim, however much of the error it takes; nor is what
+/// does harm on unseen data.
 static void refuse_claims(const struct work *w, const struct diagnosis *d, const struct hypothesis *h,
                           struct judgement *io_judgement)
 {
@@ -683,9 +686,9 @@ static bool measure_gains(struct work *w, const struct hypothesis *h)
     return good;
 }
 
-static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesis *h)
+/// Figures of all three models on unseen data, with one set of weights.
+static bool measure_models(struct work *w, struct diagnosis *d, const struct hypothesis *h)
 {
-    // The noise of the validation data under the extended model; one set of weights for all three models.
     if (!estimate_validation_noise(w, h, &d->extended_model))
         return false;
     d->nominal = validate_figures(&w->validate_data, &d->given);
@@ -694,35 +697,48 @@ static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesi
     d->mean_rms_chance = validate_mean_rms_chance(&w->validate_data);
     d->black_box_rms = ceiling_rms(w, &d->extended_model);
     d->noise_floor_nrmse = validate_noise_floor(&w->validate_data, &d->extended_model);
-    struct judgement judgement;
-    // An effect that cannot show in the validation data changes nothing there; one that spoils it is a wrong name.
-    const double clearly = 1.2;
+    return true;
+}
+
+static bool pass_judgement(struct work *w, struct diagnosis *d, const struct hypothesis *h,
+                           struct judgement *out_judgement, bool *out_distant)
+{
+    // An effect that cannot show in the validation data changes nothing there; one that spoils it is a wrong name, and
+    // so is all that leaves a model to which none at all would be preferable.
+    const double clearly = 1.2, none = 1.0;
+    double error = d->extended.validation_nrmse;
     struct judge_validation seen = {
         .mean_rms = d->extended.mean_rms,
-        .worse = d->extended.validation_nrmse > clearly * d->noise_floor_nrmse &&
-                 (d->extended.validation_nrmse > clearly * d->refitted.validation_nrmse ||
-                  d->extended.validation_nrmse > 1.0), // no model at all would be closer
+        .worse =
+            error > clearly * d->noise_floor_nrmse && (error > clearly * d->refitted.validation_nrmse || error > none),
     };
     if (!judge_structure(&w->validate_data, &d->extended_model, &seen.over_time) ||
-        !judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, &seen, &judgement))
+        !judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, &seen, out_judgement))
         return false;
     if (!repeat_compare(&w->fit_data, h, &w->fit, &w->validate_data, w->evidence + w->fit_count, &w->repeat) ||
         !estimate_validation_noise(w, h, &d->extended_model)) // which that may have moved
         return false;
-    bool distant = !w->recordings[w->fit_count].periodic &&
-                   judge_distance(d->extended.validation_nrmse, d->noise_floor_nrmse, &judgement);
+    *out_distant = !w->recordings[w->fit_count].periodic && judge_distance(error, d->noise_floor_nrmse, out_judgement);
     if (!measure_gains(w, h))
         return false;
-    refuse_claims(w, d, h, &judgement);
-    d->verdict = judgement.unexplained                                         ? diagnosis_unexplained
-                 : judgement.count > 0 || w->recordings[0].finding.effect >= 0 ? diagnosis_explained
-                                                                               : diagnosis_no_discrepancy;
+    refuse_claims(w, d, h, out_judgement);
+    d->verdict = out_judgement->unexplained                                         ? diagnosis_unexplained
+                 : out_judgement->count > 0 || w->recordings[0].finding.effect >= 0 ? diagnosis_explained
+                                                                                    : diagnosis_no_discrepancy;
+    return true;
+}
+
+static bool conclude(struct work *w, struct diagnosis *d, const struct hypothesis *h)
+{
+    struct judgement judgement;
+    bool distant;
+    if (!measure_models(w, d, h) || !pass_judgement(w, d, h, &judgement, &distant) ||
+        !misfit_find(&w->fit_data, &d->given, &d->extended_model, &d->fitted_misfit) ||
+        !misfit_find(&w->validate_data, &d->given, &d->extended_model, &d->misfit))
+        return false;
     list_causes(w, d, h, &judgement);
     list_untestable(w, d, h);
     list_deviations(w, d, h);
-    if (!misfit_find(&w->fit_data, &d->given, &d->extended_model, &d->fitted_misfit) ||
-        !misfit_find(&w->validate_data, &d->given, &d->extended_model, &d->misfit))
-        return false;
     if (judgement.unexplained) {
         wording_rest(d, judgement.where, d->where);
         d->rest_shape = judgement.shape;
@@ -778,12 +794,6 @@ int diagnosis_run(const struct diagnosis_request *request, struct diagnosis *out
 
 void diagnosis_free(struct diagnosis *self)
 {
-    struct diagnosis_curves *c = &self->curves;
-    double *all[] = {c->frequency_hz,   c->torque_Nm,         c->nominal_Nm,       c->refitted_Nm,
-                     c->extended_Nm,    c->two_sigma_Nm,      c->time_s,           c->position,
-                     c->velocity,       c->friction_measured, c->residual_nominal, c->residual_extended,
-                     c->curve_velocity, c->curve_nominal,     c->curve_extended};
-    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
-        free(all[i]);
+    validate_curves_free(&self->curves);
     memset(self, 0, sizeof *self);
 }

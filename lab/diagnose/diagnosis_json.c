@@ -227,17 +227,22 @@ const char *diagnosis_verdict_str(enum diagnosis_verdict verdict)
     return "unknown";
 }
 
+static bool add_models(cJSON *root, const struct diagnosis *self)
+{
+    return add_figures(root, "nominal", &self->nominal) && add_figures(root, "refitted", &self->refitted) &&
+           add_figures(root, "extended", &self->extended) &&
+           add_number(root, "noise_floor_nrmse", self->noise_floor_nrmse) &&
+           add_number(root, "mean_rms_chance", self->mean_rms_chance) &&
+           add_number(root, "black_box_rms", self->black_box_rms);
+}
+
 cJSON *diagnosis_json(const struct diagnosis *self)
 {
     cJSON *root = cJSON_CreateObject();
     bool ok = root && add_text(root, "verdict", diagnosis_verdict_str(self->verdict)) &&
               add_causes(root, "causes", self->causes, self->cause_count, self) &&
               add_causes(root, "candidates", self->candidates, self->candidate_count, self) && add_ties(root, self) &&
-              add_untestable(root, self) && add_figures(root, "nominal", &self->nominal) &&
-              add_figures(root, "refitted", &self->refitted) && add_figures(root, "extended", &self->extended) &&
-              add_number(root, "noise_floor_nrmse", self->noise_floor_nrmse) &&
-              add_number(root, "mean_rms_chance", self->mean_rms_chance) &&
-              add_number(root, "black_box_rms", self->black_box_rms) && add_unexplained(root, self) &&
+              add_untestable(root, self) && add_models(root, self) && add_unexplained(root, self) &&
               add_misfit(root, self) && add_context(root, self);
     if (!ok) {
         cJSON_Delete(root);

@@ -87,7 +87,8 @@ bool hidden_mass_holds(const struct hypothesis *hypothesis, int effect)
     return false;
 }
 
-/// Fits a structure from two places of its scan, half way and three quarters.
+/// Fits a structure from three places of its scan: half way, three quarters, seven eighths. A belt much stiffer than
+/// the excitation is fast is not found from below.
 static void try_structure(struct fit_data *data, struct evidence *evidence, const struct sim_coverage *coverage,
                           const struct hypothesis *before, int effect, double *io_cost, struct fit *fit,
                           struct hypothesis *io_best)
@@ -98,9 +99,10 @@ static void try_structure(struct fit_data *data, struct evidence *evidence, cons
     hypothesis_model(before, NULL, &model);
     while (sim_effects[effect]->scan(&model, coverage, total, values))
         total++;
-    for (size_t quarter = 2; quarter <= 3 && total > 0; quarter++) {
+    static const size_t eighths[] = {4, 6, 7};
+    for (size_t i = 0; i < sizeof eighths / sizeof eighths[0] && total > 0; i++) {
         struct hypothesis trial = *before;
-        sim_effects[effect]->scan(&model, coverage, quarter * total / 4, values);
+        sim_effects[effect]->scan(&model, coverage, eighths[i] * total / 8, values);
         hypothesis_name(&trial, effect, values);
         if (hidden_mass_concerns(data, &trial) && hidden_mass_fit(data, evidence, fit, &trial) &&
             fit->cost < *io_cost) {

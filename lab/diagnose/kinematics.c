@@ -186,7 +186,7 @@ bool kinematics_init(struct evidence *evidence)
     struct kinematics *self = &evidence->kinematics;
     const struct recording *r = evidence->recording;
     const size_t fewest = 8;
-    const double highest = 0.02; // of the sampling rate
+    const double highest = 0.02; // of the sample rate
     memset(self, 0, sizeof *self);
     size_t bins = (size_t)fmin((double)r->band, highest * (double)r->block.samples);
     if (!r->block.kinematics || bins < fewest || (r->periodic && r->periods < 2))

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /// What the speed column and the position column say of each other: evidence of errors of the sensors, which the
-/// mechanics see only where the speed is wrong. Looked at below a fiftieth of the sampling rate, where a derivative of
+/// mechanics see only where the speed is wrong. Looked at below a fiftieth of the sample rate, where a derivative of
 /// samples is a speed.
 #ifndef SERVOSCOPE_DIAGNOSE_KINEMATICS_H
 #define SERVOSCOPE_DIAGNOSE_KINEMATICS_H

@@ -13,7 +13,7 @@
 
 static const double turn = 6.283185307179586;
 
-/// Central differences of order 8: at a tenth of the sampling rate the error is 4e-5 of the value.
+/// Central differences of order 8: at a tenth of the sample rate the error is 4e-5 of the value.
 static void differentiate(size_t n, double rate_hz, const double *x, double *out)
 {
     static const double weights[] = {4.0 / 5, -1.0 / 5, 4.0 / 105, -1.0 / 280};
@@ -274,7 +274,7 @@ static bool from_both(size_t n, double rate_hz, const double *velocity, size_t p
         return false;
     }
     // Torque is held between samples, so speed has kinks, and position samples see their images as motion: an error of
-    // (f / f_s)^2 of the speed. Below a fiftieth of the sampling rate that is under a part in two thousand, and fades
+    // (f / f_s)^2 of the speed. Below a fiftieth of the sample rate that is under a part in two thousand, and fades
     // fast.
     const double most = turn * 0.02;
     double omega = fmax(sigma_p > 0.0 ? fmin(sigma_v / (sigma_p * rate_hz), most) : most, 1e-6);

@@ -15,7 +15,7 @@ struct stretch;
 /// so nothing is distorted. Where the two differ by more than noise, and not by gain or delay, v = speed. A speed
 /// column that contradicts the position (gain off by 2 % everywhere on the travel, or late by a tenth of a sample) is
 /// left out. Position alone: its derivative; in a run without periods after a zero-phase 4th-order Butterworth low-pass
-/// at a tenth of the sampling rate, because nothing averages the noise there. Speed alone: its integral.
+/// at a tenth of the sample rate, because nothing averages the noise there. Speed alone: its integral.
 /// out->kinematics becomes the difference of the two where both are used (the caller frees it), else NULL.
 /// Range: period is the number of samples of one period, 0 for a run without.
 /// Errors: false if memory is short.

@@ -312,7 +312,7 @@ static void choose_band(struct recording *r)
     r->band = (size_t)fmin(1.5 * (double)highest, most);
 }
 
-/// Held references change within a sample; measured torque that is slow against the sampling rate does not.
+/// Held references change within a sample; measured torque that is slow against the sample rate does not.
 static void choose_substeps(struct recording *r)
 {
     bool slow = !r->block.torque_ref && 20 * r->band < r->block.samples;

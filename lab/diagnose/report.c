@@ -431,7 +431,10 @@ static void add_rest(struct page *page, const struct diagnosis *self)
     if (self->verdict == diagnosis_unexplained) {
         char left[wording_size];
         wording_left(self, left);
-        page_add_note(page, page_warning, "Something is left that has no name", "%s.", left);
+        bool one_gap = !misfit_is_left(&self->misfit, misfit_extended) && self->rest_shape >= 0;
+        page_add_note(page, page_warning,
+                      one_gap ? "What was found is one thing that has no name" : "Something is left that has no name",
+                      "%s.", left);
     } else {
         page_add_paragraph(page, "Nothing that stands out of the noise.");
     }
@@ -441,6 +444,20 @@ static void add_rest(struct page *page, const struct diagnosis *self)
                            "explains; on unseen data its one-step errors are %.2f times what was expected.",
                            best_model(self), self->fit_misfit, self->extended.whitened_rms);
     }
+}
+
+/// What a function without a name could still take away.
+static void add_ceiling(struct page *page, const struct diagnosis *self)
+{
+    if (!isfinite(self->black_box_rms) || !isfinite(self->extended.mean_rms))
+        return;
+    page_add_paragraph(
+        page,
+        "A black box (any function of speed and of position, a short filter) that learns on the fitted "
+        "runs what the %s model leaves there brings its errors on unseen data from %.3f to %.3f times "
+        "the noise (mean of the periods, where there are periods; a perfect model stays below %.3f nineteen "
+        "times in twenty).",
+        best_model(self), self->extended.mean_rms, self->black_box_rms, self->mean_rms_chance);
 }
 
 void diagnosis_report_sections(struct page *page, const struct diagnosis *self)
@@ -455,6 +472,7 @@ void diagnosis_report_sections(struct page *page, const struct diagnosis *self)
     add_friction(page, self);
     add_gain(page, self);
     add_rest(page, self);
+    add_ceiling(page, self);
     add_untestable(page, self);
     add_next(page, self);
 }

@@ -216,6 +216,17 @@ static bool curves_allocate(struct diagnosis_curves *c, size_t bins, size_t samp
     return good;
 }
 
+void validate_curves_free(struct diagnosis_curves *self)
+{
+    double *all[] = {self->frequency_hz,   self->torque_Nm,         self->nominal_Nm,       self->refitted_Nm,
+                     self->extended_Nm,    self->two_sigma_Nm,      self->time_s,           self->position,
+                     self->velocity,       self->friction_measured, self->residual_nominal, self->residual_extended,
+                     self->curve_velocity, self->curve_nominal,     self->curve_extended};
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
+        free(all[i]);
+    memset(self, 0, sizeof *self);
+}
+
 /// One model's error per bin, and in time the torque it lacks: band-limited, mechanics only.
 static bool model_error(const struct evidence *e, const struct sim_model *model, double *out_per_bin,
                         double *out_in_time)

@@ -32,6 +32,8 @@ double validate_noise_floor(const struct fit_data *data, const struct sim_model 
 /// Curves of the first run of `data` for the report. Errors: false if memory is short.
 bool validate_curves(const struct fit_data *data, const struct diagnosis *models, struct diagnosis_curves *out_curves);
 
+void validate_curves_free(struct diagnosis_curves *self);
+
 /// Share of the given model's squared excess over `floor` that another model leaves, 0..1.
 double validate_share_left(double given, double left, double floor);
 

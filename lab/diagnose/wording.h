@@ -44,8 +44,8 @@ const char *wording_refit(const struct diagnosis *self);
 void wording_range(const struct diagnosis *self, enum misfit_axis_kind axis, const struct misfit_range *range,
                    char out_text[wording_size]);
 
-/// Where a model's misfit sits, by the axes that say most: "at 0.8..3 Hz (72 % of it), moving backward (81 %)"; "" where
-/// nothing is left, or where it is left everywhere alike.
+/// Where a model's misfit sits, by the axes that say most: "at 0.8..3 Hz (72 % of it), moving backward (81 %)"; ""
+/// where nothing is left, or where it is left everywhere alike.
 void wording_where(const struct diagnosis *self, const struct misfit *misfit, enum misfit_model model,
                    char out_text[wording_size]);
 

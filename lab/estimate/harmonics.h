@@ -10,7 +10,7 @@
 
 struct harmonics {
     double frequency_hz;
-    size_t count;     ///< harmonics below half the sampling rate; 0: there is none, or more than one line is excited
+    size_t count;     ///< harmonics below half the sample rate; 0: there is none, or more than one line is excited
     double output_db; ///< NaN: harmonics are not above the noise
     double
         input_db; ///< the same of the input: in a closed loop the drive's own distortion, in an open one the source's

@@ -29,7 +29,7 @@ void variant_free(struct variant *self)
 
 static double rate_hz(const struct design_request *request)
 {
-    return (double)request->rate_numerator_hz / request->rate_denominator;
+    return (double)request->rate_num_hz / request->rate_den;
 }
 
 /// Periods of a table that is `stretch` multisine periods long, settling ones too.

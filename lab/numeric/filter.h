@@ -16,7 +16,7 @@ struct filter {
 };
 
 /// Butterworth low-pass by the bilinear transform with prewarping; gain 1 at DC, -3 dB at `cutoff`.
-/// Range: order even, 2..16; cutoff in units of half the sampling rate, 0 < cutoff < 1.
+/// Range: order even, 2..16; cutoff in units of half the sample rate, 0 < cutoff < 1.
 struct filter filter_butterworth(size_t order, double cutoff);
 
 /// Chebyshev type I low-pass with `ripple_db` in the pass band up to `cutoff`; even order, so the DC gain is -ripple_db

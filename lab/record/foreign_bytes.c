@@ -167,8 +167,8 @@ static int utf16_order(const unsigned char *bytes, size_t length)
     return -1;
 }
 
-/// The bytes as UTF-8 without byte order mark; NULL if they are binary (*out_binary) or memory is short. `cut`: they are
-/// the beginning of more.
+/// The bytes as UTF-8 without byte order mark; NULL if they are binary (*out_binary) or memory is short. `cut`: they
+/// are the beginning of more.
 static char *decode(const unsigned char *bytes, size_t length, bool cut, enum foreign_encoding *out_encoding,
                     bool *out_binary)
 {

@@ -47,6 +47,22 @@ static bool opens_quote(const char *begin, const char *at)
     return begin == at;
 }
 
+/// Ends the cell that begins there, and returns where the next one begins; NULL: it was the last.
+static char *cut_cell(char *begin, char separator)
+{
+    bool quoted = false;
+    char *at = begin;
+    for (; *at != '\0' && (*at != separator || quoted); at++)
+        if (*at == '"')
+            quoted = quoted ? false : opens_quote(begin, at);
+    if (*at == '\0')
+        return NULL;
+    *at++ = '\0';
+    while (separator == ' ' && is_space(*at))
+        at++;
+    return at;
+}
+
 int foreign_cells_split(char *line, char separator, struct foreign_cells *out_cells, struct error *out_error)
 {
     size_t most = 1;
@@ -57,22 +73,12 @@ int foreign_cells_split(char *line, char separator, struct foreign_cells *out_ce
         return error_set(out_error, error_refused, "memory is short");
     while (separator == ' ' && is_space(*line))
         line++;
-    bool quoted = false;
-    char *begin = line;
-    for (char *at = line;; at++) {
-        if (*at == '"')
-            quoted = quoted ? false : opens_quote(begin, at);
-        if (*at != '\0' && (*at != separator || quoted))
-            continue;
-        const bool last = *at == '\0';
-        *at = '\0';
-        while (!last && separator == ' ' && is_space(at[1]))
-            at++;
+    for (char *begin = line; begin;) {
+        char *next = cut_cell(begin, separator);
         out_cells->items[out_cells->count++] = trim(begin);
-        begin = at + 1;
-        if (last || (separator == ' ' && *begin == '\0'))
-            return 0;
+        begin = separator == ' ' && next && *next == '\0' ? NULL : next;
     }
+    return 0;
 }
 
 void foreign_cells_free(struct foreign_cells *self)

@@ -69,19 +69,23 @@ static double *find_valid(struct text_table *io_table, const char *name, struct 
     return status ? NULL : valid;
 }
 
+static size_t count_lost(const struct text_table *table, const bool *used, size_t *out_first)
+{
+    size_t count = 0;
+    for (size_t n = 0; n < table->rows; n++)
+        if (!is_whole(table, used, n) && count++ == 0)
+            *out_first = n;
+    return count;
+}
+
 int foreign_mark_gaps(struct text_table *io_table, const bool *used, const char *valid_name,
                       struct format_notes *io_notes, struct error *out_error)
 {
     int status = cut_end(io_table, used, io_notes, out_error);
     const size_t columns = io_table->column_count;
-    size_t marked = 0;
     size_t first = 0;
-    for (size_t n = 0; !status && n < io_table->rows; n++) {
-        const bool lost = !is_whole(io_table, used, n);
-        first = lost && marked == 0 ? n : first;
-        marked += lost;
-    }
-    if (status || marked == 0)
+    const size_t marked = status ? 0 : count_lost(io_table, used, &first);
+    if (marked == 0)
         return status;
     format_notes_add(io_notes, format_kept,
                      "%zu row%s with an empty cell, the first in line %zu (%s): marked as lost with valid 0", marked,

@@ -31,7 +31,20 @@ static int64_t day_number(int64_t year, int64_t month, int64_t day)
     return 365 * years + years / 4 - years / 100 + years / 400 + (153 * months + 2) / 5 + day - 1;
 }
 
-/// Three numbers with one mark between them. *io_at stays where it was if there are none.
+/// The year is the first or the last of the three; 3/4/2026 is a day of March or of April: whoever wrote it knows.
+static bool take_date(int64_t first, int64_t second, int64_t third, bool slashes, struct foreign_stamp *io_stamp)
+{
+    const bool year_first = first >= 1000;
+    if (third < 1 || (!year_first && third < 1000))
+        return false;
+    const int64_t year = year_first ? first : third;
+    const int64_t day = year_first ? third : first;
+    io_stamp->dated = (year_first || !slashes) && second <= 12 && day <= 31;
+    io_stamp->day = io_stamp->dated ? day_number(year, second, day) : 0;
+    return true;
+}
+
+/// Three numbers with one mark between them.
 static bool read_date(const char **io_at, struct foreign_stamp *io_stamp)
 {
     const char *at = *io_at;
@@ -45,16 +58,8 @@ static bool read_date(const char **io_at, struct foreign_stamp *io_stamp)
         return false;
     at++;
     const int64_t third = read_digits(&at, 1, 4);
-    const bool year_first = first >= 1000;
-    if (third < 1 || first > 9999 || (!year_first && third < 1000))
-        return false;
-    const int64_t year = year_first ? first : third;
-    const int64_t day = year_first ? third : first;
-    // 3/4/2026 is a day of March or of April: whoever wrote it knows.
-    io_stamp->dated = (year_first || mark != '/') && second <= 12 && day <= 31;
-    io_stamp->day = io_stamp->dated ? day_number(year, second, day) : 0;
     *io_at = at;
-    return true;
+    return take_date(first, second, third, mark == '/', io_stamp);
 }
 
 /// Digits behind a point, a comma, or (of three) a colon, in ns; 0 if there are none.
@@ -96,35 +101,50 @@ static const char *skip_blanks(const char *at)
     return at;
 }
 
+static const char *take_noon(const char *at, int64_t *io_ns)
+{
+    const int64_t noon = 43200 * second_ns;
+    if (strncasecmp(at, "am", 2) != 0 && strncasecmp(at, "pm", 2) != 0)
+        return at;
+    const bool twelve = *io_ns >= noon;
+    *io_ns += (twelve ? -noon : 0) + (tolower((unsigned char)*at) == 'p' ? noon : 0);
+    return skip_blanks(at + 2);
+}
+
+/// "+01", "+01:00" or "+0100" taken off; NULL if that is none.
+static const char *take_zone(const char *at, int64_t *io_ns)
+{
+    const int64_t sign = *at++ == '+' ? -1 : 1;
+    const int64_t hours = read_digits(&at, 2, 4);
+    const int64_t whole = hours > 23 ? hours / 100 : hours;
+    int64_t minutes = hours > 23 ? hours % 100 : 0;
+    if (hours >= 0 && *at == ':') {
+        at++;
+        minutes = read_digits(&at, 2, 2);
+    }
+    *io_ns += sign * (3600 * whole + 60 * minutes) * second_ns;
+    return hours < 0 || minutes < 0 ? NULL : at;
+}
+
 /// AM and PM, a time zone; false if something else is behind the clock.
 static bool read_rest(const char *at, int64_t *io_ns)
 {
-    const int64_t noon = 43200 * second_ns;
-    at = skip_blanks(at);
-    if (strncasecmp(at, "am", 2) == 0 || strncasecmp(at, "pm", 2) == 0) {
-        const bool twelve = *io_ns >= noon;
-        *io_ns += (twelve ? -noon : 0) + (tolower((unsigned char)*at) == 'p' ? noon : 0);
-        at = skip_blanks(at + 2);
-    }
+    at = take_noon(skip_blanks(at), io_ns);
     if (*at == 'Z' || strncmp(at, "UTC", 3) == 0)
         at += *at == 'Z' ? 1 : 3;
-    if (*at == '+' || *at == '-') {
-        const int64_t sign = *at++ == '+' ? -1 : 1;
-        const int64_t hours = read_digits(&at, 2, 4);
-        const int64_t whole = hours > 23 ? hours / 100 : hours;
-        const int64_t minutes = hours > 23 ? hours % 100 : *at == ':' ? (at++, read_digits(&at, 2, 2)) : 0;
-        if (hours < 0 || minutes < 0)
-            return false;
-        *io_ns += sign * (3600 * whole + 60 * minutes) * second_ns;
-    }
-    return *skip_blanks(at) == '\0';
+    if (*at == '+' || *at == '-')
+        at = take_zone(at, io_ns);
+    return at && *skip_blanks(at) == '\0';
 }
 
 bool foreign_stamp_read(const char *cell, struct foreign_stamp *out_stamp)
 {
-    const char *at = skip_blanks(cell);
+    const char *const begin = skip_blanks(cell);
+    const char *at = begin;
     *out_stamp = (struct foreign_stamp){.dated = false};
-    if (read_date(&at, out_stamp)) {
+    if (!read_date(&at, out_stamp)) {
+        at = begin;
+    } else {
         if (*at != 'T' && *at != ' ' && *at != '_' && *at != ',')
             return false;
         at = skip_blanks(at + 1);

@@ -63,8 +63,8 @@ enum foreign_value {
     foreign_value_text,
 };
 
-/// Reads a cell's number, whose decimal mark is `decimal`; marks between thousands are blanks, apostrophes and the other
-/// of point and comma. *out_value is NaN where there is none.
+/// Reads a cell's number, whose decimal mark is `decimal`; marks between thousands are blanks, apostrophes and the
+/// other of point and comma. *out_value is NaN where there is none.
 enum foreign_value foreign_number(const char *cell, char decimal, double *out_value);
 
 /// Whether the value is a number, marks between thousands or not.
@@ -100,9 +100,9 @@ void foreign_name(const char *name, const char *unit, char *out_name, size_t siz
 int foreign_take_run(struct text_table *io_table, const struct format_options *options, struct run *out_run,
                      struct format_notes *io_notes, struct error *out_error);
 
-/// Marks the rows in which one of the columns `used` has no value: `valid` is 0 there, and every used column repeats its
-/// last value (the first ones: its next). Rows behind the last whole one are cut. Adds the column `valid_name` if rows are
-/// to be marked and the table has none of that name.
+/// Marks the rows in which one of the columns `used` has no value: `valid` is 0 there, and every used column repeats
+/// its last value (the first ones: its next). Rows behind the last whole one are cut. Adds the column `valid_name` if
+/// rows are to be marked and the table has none of that name.
 /// Errors: error_refused (no whole row; memory)
 int foreign_mark_gaps(struct text_table *io_table, const bool *used, const char *valid_name,
                       struct format_notes *io_notes, struct error *out_error);

@@ -140,6 +140,17 @@ static int read_cell(struct table_reader *self, size_t column, size_t line, cons
     return value == foreign_value_text ? wrong_cell(self, line, column, cell, "number", out_error) : 0;
 }
 
+/// Whether cells are none of a row: no number among them, or another count of cells and not all of them numbers.
+static bool is_footer(const struct table_reader *self, const struct foreign_cells *cells)
+{
+    size_t values = 0;
+    for (size_t c = 0; c < cells->count; c++) {
+        double value;
+        values += foreign_is_number(foreign_number(cells->items[c], self->layout.decimal, &value));
+    }
+    return values == 0 || (cells->count != self->layout.columns && values < cells->count);
+}
+
 /// One line as a row. *out_footer: it is none, and may be the first of the lines behind the values.
 static int read_row(struct table_reader *self, size_t line, bool *out_footer, struct error *out_error)
 {
@@ -150,15 +161,9 @@ static int read_row(struct table_reader *self, size_t line, bool *out_footer, st
     if (!copy)
         return short_of_memory(self, out_error);
     int status = foreign_cells_split(copy, self->layout.separator, &cells, out_error);
-    size_t values = 0;
-    for (size_t c = 0; !status && c < cells.count; c++) {
-        double value;
-        values += foreign_is_number(foreign_number(cells.items[c], self->layout.decimal, &value));
-    }
-    *out_footer = !status && cells.count != columns && values < cells.count;
-    *out_footer = *out_footer || (!status && values == 0);
-    if (!status && !*out_footer &&
-        (cells.count < columns || (cells.count > columns && cells.items[columns][0] != '\0')))
+    *out_footer = !status && is_footer(self, &cells);
+    const bool more = cells.count > columns && cells.items[columns][0] != '\0';
+    if (!status && !*out_footer && (cells.count < columns || more))
         status = error_set(out_error, error_refused, "%s:%zu: %zu cells, expected %zu", self->text->path, line + 1,
                            cells.count, columns);
     for (size_t c = 0; !status && !*out_footer && c < columns; c++)
@@ -421,6 +426,16 @@ static int fill_table(struct table_reader *self, struct error *out_error)
     return status;
 }
 
+static int keep_line(struct table_reader *self, char *text, struct error *out_error)
+{
+    char *colon = text[0] == '#' ? strchr(text, ':') : NULL;
+    if (colon)
+        *colon = '\0';
+    const char *key = colon ? text + strspn(text, "# ") : "";
+    const char *value = colon ? colon + 1 : text;
+    return record_table_add_key(&self->table, key, value + strspn(value, "# "), out_error);
+}
+
 /// What stands in front of the names: keys where a line is `# key: value`, comments else.
 static int keep_head(struct table_reader *self, struct error *out_error)
 {
@@ -429,14 +444,9 @@ static int keep_head(struct table_reader *self, struct error *out_error)
     int status = 0;
     for (size_t line = 0; line < end && !status; line++) {
         char *text = self->text->lines[line];
-        char *colon = text[0] == '#' ? strchr(text, ':') : NULL;
         if (foreign_line_is_blank(text) || strncasecmp(text, "sep=", 4) == 0 || ++kept > kept_lines_max)
             continue;
-        if (colon)
-            *colon = '\0';
-        const char *key = colon ? text + strspn(text, "# ") : "";
-        const char *value = colon ? colon + 1 : text;
-        status = record_table_add_key(&self->table, key, value + strspn(value, "# "), out_error);
+        status = keep_line(self, text, out_error);
     }
     if (!status && kept > 0)
         format_notes_add(self->notes, format_kept, "%zu line%s in front of the names, as keys and comments",

@@ -85,7 +85,7 @@ int table_set_rate(struct table *self, double rate_hz, struct error *out_error)
 {
     static const double tolerance = 1e-12;
     if (!(rate_hz >= 1e-6 && rate_hz <= 4e9))
-        return error_set(out_error, error_refused, "sampling rate of %g Hz: 1e-6 to 4e9 Hz was expected", rate_hz);
+        return error_set(out_error, error_refused, "sample rate of %g Hz: 1e-6 to 4e9 Hz was expected", rate_hz);
     /* Convergents of the continued fraction: the best fractions there are, with growing denominators. */
     double rest = rate_hz;
     double num = 1, den = 0, num_before = 0, den_before = 1;
@@ -103,8 +103,7 @@ int table_set_rate(struct table *self, double rate_hz, struct error *out_error)
         rest = 1 / (rest - whole);
     }
     if (!(num >= 1 && den >= 1 && fabs(num / den - rate_hz) <= 1e-9 * rate_hz))
-        return error_set(out_error, error_refused, "sampling rate of %.17g Hz is no fraction of 32-bit numbers",
-                         rate_hz);
+        return error_set(out_error, error_refused, "sample rate of %.17g Hz is no fraction of 32-bit numbers", rate_hz);
     self->rate_num_hz = (uint32_t)num;
     self->rate_den = (uint32_t)den;
     return error_none;

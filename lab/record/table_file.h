@@ -16,7 +16,7 @@
 
 /// Zero-initialise, then table_alloc() or table_file_read(); table_free() in every case.
 struct table {
-    uint32_t rate_num_hz, rate_den; ///< sampling rate as a fraction; see table_set_rate()
+    uint32_t rate_num_hz, rate_den; ///< sample rate as a fraction; see table_set_rate()
     uint32_t samples;               ///< N, one period
     uint32_t channels;              ///< of the .mst file: 1 torque; 2 and velocity; 3 and position
     double *torque;                 ///< N values each, Nm, rad/s, rad, rad/s^2 (linear: N, m/s, m, m/s^2); owned

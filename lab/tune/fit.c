@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/tune/fit.h"
 
+#include "lab/numeric/cmplx.h"
+
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
@@ -76,12 +78,19 @@ static double complex loop_at(const struct tune_problem *self, const double comp
     return sum * response[k];
 }
 
+/// A loop's distance from -1 is far from the ends of what a double holds, which the division of complex.h looks out for.
+static double complex reciprocal(double complex z)
+{
+    const double square = creal(z) * creal(z) + cimag(z) * cimag(z);
+    return CMPLX(creal(z) / square, -cimag(z) / square);
+}
+
 double tune_fit_cost(const struct tune_problem *self, const double complex *response, const double *gain)
 {
     double sum = 0.0;
     for (size_t k = 0; k < self->lines; k++) {
         const double complex loop = loop_at(self, response, gain, k);
-        const double error = self->weight[k] * cabs(self->reference[k] - loop / (1.0 + loop));
+        const double error = self->weight[k] * cabs(self->reference[k] - loop * reciprocal(1.0 + loop));
         sum += error * error;
     }
     return sum;
@@ -105,7 +114,8 @@ static void collect(const struct tune_problem *self, const double complex *respo
     memset(out, 0, sizeof *out);
     for (size_t k = 0; k < self->lines; k++) {
         const double complex rest = 1.0 - self->reference[k];
-        const double complex factor = self->weight[k] * (gain ? 1.0 / (1.0 + loop_at(self, response, gain, k)) : rest);
+        const double complex factor =
+            self->weight[k] * (gain ? reciprocal(1.0 + loop_at(self, response, gain, k)) : rest);
         double complex column[tune_gains_max];
         for (size_t i = 0; i < self->gains; i++) {
             column[i] = factor * rest * self->term[i * self->lines + k];
@@ -227,9 +237,17 @@ bool tune_fit_linear(const struct tune_problem *self, const double complex *resp
 
 bool tune_fit_reweighted(const struct tune_problem *self, const double complex *response, double *io_gain)
 {
-    for (int iteration = 0; iteration < tune_iterations; iteration++) {
-        if (!fit(self, response, io_gain, io_gain)) {
+    const double settled = 1e-12; // relative: what further iterations would still change is lost in rounding
+    bool moves = true;
+    for (int iteration = 0; iteration < tune_iterations && moves; iteration++) {
+        double before[tune_gains_max];
+        memcpy(before, io_gain, self->gains * sizeof *before);
+        if (!fit(self, response, before, io_gain)) {
             return false;
+        }
+        moves = false;
+        for (size_t i = 0; i < self->gains; i++) {
+            moves = moves || !(fabs(io_gain[i] - before[i]) <= settled * fabs(io_gain[i]));
         }
     }
     return true;

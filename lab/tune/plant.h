@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/// The plant of a loop as it was measured: the valid lines of a frequency response at the controller's sampling rate.
+/// The plant of a loop as it was measured: the valid lines of a frequency response at the controller's sample rate.
 #ifndef SERVOSCOPE_TUNE_PLANT_H
 #define SERVOSCOPE_TUNE_PLANT_H
 

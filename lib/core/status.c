@@ -14,7 +14,7 @@ static const struct {
     {core_err_table_version, "table version is unknown"},
     {core_err_table_header_crc, "CRC-32 of the table's header is wrong"},
     {core_err_table_data_crc, "CRC-32 of the table's data is wrong"},
-    {core_err_table_rate, "sampling rate is zero or divided by zero"},
+    {core_err_table_rate, "sample rate is zero or divided by zero"},
     {core_err_table_samples, "period is too short or too long"},
     {core_err_table_channels, "number of channels is not 1, 2 or 3"},
     {core_err_table_format, "number format is not i16, i32 or f32"},

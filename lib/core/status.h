@@ -20,7 +20,7 @@ enum core_status {
     core_err_table_version = -13,   ///< a version this program does not know
     core_err_table_header_crc = -14,
     core_err_table_data_crc = -15,
-    core_err_table_rate = -16,      ///< sampling rate with numerator or denominator 0
+    core_err_table_rate = -16,      ///< sample rate with numerator or denominator 0
     core_err_table_samples = -17,   ///< N outside 4 .. SERVOSCOPE_TABLE_SAMPLES_MAX
     core_err_table_channels = -18,  ///< not 1 .. 3
     core_err_table_format = -19,    ///< not i16, i32 or f32

@@ -10,9 +10,12 @@
 /// scale in up to 200 lines, N = 2000 .. 65536 (tests/unit/test_frf_block.c prints and checks it).
 ///
 /// Instructions per sample, bin and channel on Cortex-M4 at 200 bins (./run bench firmware-dft): any lines 1.9 with
-/// L = 32 (1.7: 64), below 0.1 of the sampling rate 0.7 to 0.9, below 0.02 of it 0.4, odd lines 1.1, if fed in blocks;
-/// a call per frame adds 0.3. They come in a burst every L samples, or spread over the
-/// following L (`spread`), which delays a period's result by L samples.
+/// L = 32 (1.7: 64), below 0.1 of the sample rate 0.7 to 0.9, below 0.02 of it 0.35, odd lines 1.0, if fed in blocks;
+/// a call per frame costs some 55 instructions more, whatever the bins and channels: 0.27 at one channel, 0.09 at three
+/// (odd lines twice that). Samples are folded as they arrive; the rest comes in a burst every L samples, or evenly over
+/// the following ones (`spread`): then the longest call is 1.2 to 2.2 times the mean one, and a period's result is there
+/// L - 1 samples later. Where L does not divide the period, two blocks of it are worked on in between half of L and L.
+/// Where it is folded (Q), all work falls into the last Qth of the period. The results are the same bits either way.
 ///
 /// Periods, banks, reasons and the reader's side are those of frf/dft.h. With one bank the last period stays readable
 /// until the first block of the next one is worked on, with two for a whole period.
@@ -117,7 +120,7 @@ void frf_block_add_i16(struct frf_block *self, const int16_t *frames, uint32_t c
 
 /// Passes over `count` lost frames: phase stays true, the periods touched are marked with frf_reason_gap. Blocks that a
 /// gap ends are left out, so the sums of these periods mean nothing.
-/// Cost: at most one block's work; a latch per period passed. Call it where samples are added.
+/// Cost: at most one block's work, where that completes a period; else its words are cleared, and the folded period's.
 void frf_block_skip(struct frf_block *self, uint32_t count);
 
 /// Marks the period being filled with the bits of enum frf_reason. Call it where samples are added.

@@ -15,8 +15,9 @@
 ///
 /// (tests/unit/test_frf_dft.c and test_frf_i24.c print and check them.) The factors come from a full table, or from a
 /// shorter one that takes more time (frf/twiddle.h): a quarter, with the same sums, or two levels. Cost: 2 K C
-/// multiply-accumulates a sample for K bins and C channels; the channels share the table look-up. Feed blocks rather than single samples: a block keeps a bin's sums
-/// in registers. On cores with a long multiply frf/block.h is six to thirty times cheaper, at 100 dB.
+/// multiply-accumulates a sample for K bins and C channels; the channels share the table look-up. Feed blocks rather
+/// than single samples: a block keeps a bin's sums in registers. On cores with a long multiply frf/block.h is six to
+/// thirty times cheaper, at 100 dB.
 ///
 /// One writer (the interrupt) feeds; at the end of a period the sums are latched by switching between two banks,
 /// without a copy; one reader has a whole period's time to read the last bank and asks afterwards whether it was in
@@ -165,8 +166,8 @@ enum core_status frf_dft_init_two_level_f32(struct frf_dft *self, const struct f
 /// Cost:      2 K C multiply-accumulates a frame; interrupt-safe, one caller per object
 void frf_dft_add_i16(struct frf_dft *self, const int16_t *frames, uint32_t count);
 
-/// The same for the q23 variant: samples of 24 bits, with their sign extended. A frame with a sample that 24 bits do not
-/// hold counts as saturated, and as zeros.
+/// The same for the q23 variant: samples of 24 bits, sign extended. A frame with a sample that 24 bits do not hold
+/// counts as saturated, and as zeros.
 void frf_dft_add_i24(struct frf_dft *self, const int32_t *frames, uint32_t count);
 
 /// The same for the f32 variant. A frame with a sample that is not finite counts as zeros and makes the period invalid.

@@ -2,15 +2,16 @@
 /// Tables of sine and cosine over one period, from which the DFT takes every factor: angle 2 pi k n / N is entry
 /// k n mod N. A table is const data (in flash, made on the host) or is built at start-up by the functions below.
 ///
-///     table      entries                       factors                             words, N = 2000 / 65536
-///     full       5/4 N, or 2 N                 correctly rounded, one load each    2500 / 81920
-///     quarter    N/4 + 1, N/2 + 1 or N + 1     the same to the last bit            501 / 16385
-///     two-level  about 2 sqrt(N) pairs         within 0.7, 0.51, 1.4 steps of Q15, Q23, Q31         190 / 1024
+///     table      entries                    factors                              words, N = 2000 / 65536
+///     full       5/4 N, or 2 N              correctly rounded, a load each                  2500 / 81920
+///     quarter    N/4 + 1, N/2 + 1 or N + 1  the same to the last bit                         501 / 16385
+///     two-level  about 2 sqrt(N) pairs      within 0.7 (Q15), 0.51 (Q23), 1.4 (Q31) steps    190 / 1024
 ///
-/// The kind of table is its type, and each kind has its own frf_dft_init_*(); what comes after that is the same for
-/// all. A program links the kinds that it sets up.
+/// The kind of table is its type, and each kind has its own frf_dft_init_*(); what comes after that is the
+/// same for all. A program links the kinds that it sets up.
 ///
-/// Full: where 4 divides N the cosine is the sine a quarter of a period on, and a quarter more sine is stored so that it
+/// Full: where 4 divides N the cosine is the sine a quarter of a period on, and a quarter more sine is stored so that
+///       it
 /// is read without a wrap; elsewhere the cosine has its own table.
 ///
 /// Quarter: sine of the first quarter, both ends included, in steps of which a sample is 1, 2 or 4: as many as it takes

@@ -35,16 +35,21 @@ static enum core_status check(const void *coarse, uint32_t coarse_points, const 
     return coarse_points < points_of(period) || fine_turns < turns_of(period) ? core_err_storage : core_ok;
 }
 
-/* Of an index, which may be up to N below 0 or N above the last. */
+/* Of an index that may be less than N below 0 or beyond the last, in eighths of a sample. */
+static uint32_t eighths_of(int32_t index, uint32_t period)
+{
+    uint32_t within = index < 0 ? (uint32_t)(index + (int32_t)period) : (uint32_t)index;
+    return 8u * (within >= period ? within - period : within);
+}
+
 static double sine_of(int32_t index, uint32_t period)
 {
-    uint32_t positive = (uint32_t)(index + (int32_t)period) % period;
-    return frf_sine_of_eighths(8u * positive, period);
+    return frf_sine_of_eighths(eighths_of(index, period), period);
 }
 
 static double cosine_of(int32_t index, uint32_t period)
 {
-    uint32_t eighths = 8u * ((uint32_t)(index + (int32_t)period) % period) + 2u * period;
+    uint32_t eighths = eighths_of(index, period) + 2u * period;
     return frf_sine_of_eighths(eighths >= 8u * period ? eighths - 8u * period : eighths, period);
 }
 

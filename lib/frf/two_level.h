@@ -14,13 +14,18 @@
 extern "C" {
 #endif
 
+/* FRF_GROUP_BITS(): as long as a bit more leaves 32 groups and at most twice as many turns as groups. */
 static inline uint32_t frf_group_bits(uint32_t period)
 {
-    return FRF_GROUP_BITS(period);
+    uint32_t bits = 0;
+    while (period >> (bits + 1u) >= 32u && period >> (2u * bits + 1u) > 0u) {
+        ++bits;
+    }
+    return bits;
 }
 
-/* Q31 by Q34 and the upper word of it: what is taken off, in Q33, plus `more` of Q33. |turn| < 0.1 2^34, so that the sum
- * stays below 2^63. */
+/* Q31 by Q34 and the upper word of it: what is taken off, in Q33, plus `more` of Q33. |turn| < 0.1 2^34, so that the
+ * sum stays below 2^63. */
 static inline int32_t frf_off_cosine_q33(const struct frf_point *coarse, const struct frf_turn *turn, int32_t more)
 {
     int64_t sum = (int64_t)coarse->cosine * turn->less + (int64_t)coarse->sine * turn->sine;

@@ -8,8 +8,8 @@
 ///          4    2  version: 1, or 2 for a table whose position travels
 ///          6    1  channels: 1 torque; 2 torque, velocity; 3 torque, velocity, position
 ///          7    1  number format: 1 i16, 2 i32, 3 f32
-///          8    4  sampling rate, numerator, Hz
-///         12    4  sampling rate, denominator
+///          8    4  sample rate, numerator, Hz
+///         12    4  sample rate, denominator
 ///         16    4  N, samples in the period: 4 .. 2^20
 ///         20    4  K, number of excited bins: 1 .. below N/2
 ///         24    4  start index: 0 .. N-1

@@ -37,6 +37,6 @@ const struct sim_effect sim_effect_dead_time = {
                     .linear_maximum = 0.05,
                     .model_offset = offsetof(struct sim_model, dead_time_s)}},
     .scan = delay_scan,
-    .measure = "with lines up to a quarter of the sampling rate",
+    .measure = "with lines up to a quarter of the sample rate",
     .say = delay_say,
 };

@@ -38,6 +38,6 @@ const struct sim_effect sim_effect_torque_lag = {
                     .linear_maximum = 1.0,
                     .model_offset = offsetof(struct sim_model, torque_lag_s)}},
     .scan = lag_scan,
-    .measure = "with lines up to a quarter of the sampling rate",
+    .measure = "with lines up to a quarter of the sample rate",
     .say = lag_say,
 };

@@ -44,8 +44,8 @@ void setUp(void)
         bins[k] = 1 + 2 * k; // odd lines: even bins and odd ones above them show what is not linear
     }
     request = (struct design_request){
-        .rate_numerator_hz = 1000,
-        .rate_denominator = 1,
+        .rate_num_hz = 1000,
+        .rate_den = 1,
         .period_samples = length,
         .bin_count = lines,
         .bins = bins,

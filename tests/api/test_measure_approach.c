@@ -70,8 +70,8 @@ static void design(enum design_start kind, struct design_result *out_design)
         bins[k] = k + 1;
     }
     const struct design_request request = {
-        .rate_numerator_hz = 1000,
-        .rate_denominator = 1,
+        .rate_num_hz = 1000,
+        .rate_den = 1,
         .period_samples = length,
         .bin_count = lines,
         .bins = bins,

@@ -48,6 +48,19 @@ for name in ("candidates", "ties", "untestable"):
 assert said["extended"]["validation_nrmse"] < 0.5 * said["refitted"]["validation_nrmse"], said
 assert 0 < said["noise_floor_nrmse"] < said["nominal"]["validation_nrmse"], said
 assert "unexplained" not in said
+# What the cause is worth on unseen data, and where the models are wrong, on all six axes.
+cause = said["causes"][0]
+assert cause["validation_evidence"] > 0.2 * cause["evidence"], cause
+assert cause["validation_nrmse_without"] > 2 * said["extended"]["validation_nrmse"], cause
+misfit = said["misfit"]
+assert misfit["nominal_noise_share"] < 0.5 < misfit["extended_noise_share"], misfit
+assert misfit["nominal_where"] and not misfit["extended_where"], misfit
+for axis in ("frequency_hz", "velocity_rad_per_s", "position_rad", "direction", "time_s", "level_Nm"):
+    parts = misfit[axis]
+    assert len(parts["from"]) == len(parts["to"]) == len(parts["nominal"]["rms"]) == len(parts["extended"]["rms"]) >= 2, axis
+    assert abs(sum(parts["nominal"]["share"]) - 1) < 1e-6, axis
+    assert max(parts["nominal"]["rms"]) > 1.5 > 0.9 * min(parts["extended"]["rms"]), axis
+assert said["judged_on"] == "b.csv", said["judged_on"]
 # The extended model has the estimates as its parameters, and it is the given model otherwise.
 model, nominal = json.load(open("m.json")), json.load(open("nominal.json"))
 found = said["causes"][0]["parameters"]["amplitude_Nm"]
@@ -86,6 +99,22 @@ cmp -s <(python3 -c 'import json; print(json.load(open("said"))["causes"])') \
 "$SERVOSCOPE" diagnose a.csv --model nominal.json >said || fail "one run"
 grep -q 'Record a second run' said || fail "one run: $(cat said)"
 
+# What has no name is said with where it lies, how much it is and what would show it.
+"$truth_case" --seed 951 --kind position_friction --size clear --protocol stroke --out unknown
+"$SERVOSCOPE" diagnose unknown/run1.csv --validate unknown/run2.csv --model unknown/nominal.json --json-out u.json --report u.html \
+    >said || fail "status $? for an unknown cause"
+grep -q '^Where it is wrong' said || fail "not where: $(cat said)"
+python3 - <<'PYTHON' || fail "an unknown cause: $(cat said)"
+import json
+said, printed = json.load(open("u.json")), open("said").read()
+assert said["verdict"] == "unexplained", said["verdict"]
+where = said["unexplained"]["where"]
+assert where.startswith("at ") and " % of it)" in where and "friction that changes with position" in where, where
+assert where in printed and where.replace("'", "&#39;") in open("u.html").read(), where
+assert any(step.startswith("To see what has no name: measure one slow stroke") for step in said["next"]), said["next"]
+assert said["misfit"]["extended_where"], said["misfit"]
+PYTHON
+
 # A verdict of any kind ends with status 0.
 "$truth_case" --seed 1 --kind clean --out clean
 "$SERVOSCOPE" diagnose clean/run1.csv --validate clean/run2.csv --model clean/nominal.json >said || fail "status $? for no discrepancy"
@@ -107,7 +136,7 @@ refuse 1 "empty.csv" empty.csv --validate b.csv
 refuse 1 "empty.csv" a.csv --validate b.csv empty.csv
 awk -F, 'BEGIN{OFS=","} /^#/||!seen{if(!/^#/)seen=1; print; next} {n++; if(n==50)$3="nan"; print}' a.csv >nan.csv
 refuse 1 "nan.csv:" nan.csv --validate b.csv
-sed '/^[^#]/{s/torque_Nm/unknown_Nm/g}' a.csv >column.csv
+sed '/^[^#]/{s/torque_Nm/unknown/g}' a.csv >column.csv
 refuse 1 "column.csv: no torque" column.csv --validate b.csv
 refuse 1 "column.csv: no torque" a.csv --validate column.csv
 gzip -c a.csv >whole.csv.gz

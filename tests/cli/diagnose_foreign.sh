@@ -58,6 +58,13 @@ assert {"inertia", "second_mode", "periodic_disturbance"} <= blind, blind
 assert any("reference" in step for step in said["next"]) or said["verdict"] != "unexplained", said["next"]
 PYTHON
 
+# Names that say their units need no map, and a note says what was taken; names that say none are listed.
+"$SERVOSCOPE" diagnose slow1.csv --validate slow2.csv --rate 200 --json-out guessed.json >said || fail "status $? without --map"
+grep -q 'columns were named by the units in their names: --map current_A=i_A,position_rad=angle_rad' said ||
+    fail "not said how columns were named: $(cat said)"
+sed '1s/.*/sample,iq,enc/' slow1.csv >nameless.csv
+refuse 1 'the file has sample, iq, enc: --map current_A=COLUMN says which it is' nameless.csv --rate 200
+
 push=voltage_V=u_V,position_m=place_m
 "$SERVOSCOPE" diagnose push1.csv --validate push2.csv --map $push --json-out push.json >said || fail "status $? for a voltage"
 grep -q 'Positive voltage accelerates backward .* its sign was turned' said || fail "no word of the sign: $(cat said)"

@@ -14,6 +14,29 @@ fail() {
     failures=$((failures + 1))
 }
 
+listing() { # listing PAGE: its ```c block
+    awk '/^```$/ { inside = 0 } inside { print } /^```c$/ { inside = 1 }' "$1"
+}
+
+# The effect and the make of drives that the pages add: compiled, and linked with the program as it is, in place of the build's lists.
+teach() { # teach BUILD PROGRAM
+    local generated=$1/generated link
+    listing "$docs/guides/add-a-cause.md" >"$folder/effect.c"
+    listing "$docs/bus.md" >"$folder/profile.c"
+    sed 's/^const struct sim_effect \*const/extern const struct sim_effect sim_effect_quadratic_drag;\n&/; s/^    NULL,/    \&sim_effect_quadratic_drag,\n&/' \
+        "$generated/effects.c" >"$folder/effects.c"
+    sed 's/^const struct cia402_profile \*const/extern const struct cia402_profile cia402_profile_acme_one;\n&/; s/^    NULL,/    \&cia402_profile_acme_one,\n&/' \
+        "$generated/profiles.c" >"$folder/profiles.c"
+    for file in effect effects profile profiles; do
+        "${CC:-cc}" -std=c11 -Wall -Wextra -Wpedantic -Wshadow -Werror -I "$SERVOSCOPE_SOURCE" -I "$SERVOSCOPE_SOURCE/lib" \
+            -c "$folder/$file.c" -o "$folder/$file.o" || return 1
+    done
+    link=$(ninja -C "$1" -t commands servoscope | tail -n 1)
+    (cd "$1" && eval "${link/ -o servoscope / -o $2 $folder/effect.o $folder/effects.o $folder/profile.o $folder/profiles.o }")
+}
+mkdir "$folder/taught"
+teach "$(dirname "$SERVOSCOPE")" "$folder/taught/servoscope" || fail "the program with the pages' effect and make"
+
 pages=("$docs/quick-start.md" "$docs"/guides/*.md)
 ran=0
 for page in "${pages[@]}"; do
@@ -22,22 +45,84 @@ for page in "${pages[@]}"; do
     "$SERVOSCOPE_SOURCE/scripts/page-commands" "$page" >"$folder/$name/commands"
     [ -s "$folder/$name/commands" ] || continue
     ran=$((ran + 1))
-    (cd "$folder/$name" && "$SERVOSCOPE_SOURCE/scripts/page-commands" "$page" --run >said 2>&1) || {
+    program=$SERVOSCOPE
+    case $name in
+    add-a-cause) program=$folder/taught/servoscope ;;
+    firmware)
+        listing "$page" >"$folder/$name/drive.c"
+        "$SERVOSCOPE_SOURCE/scripts/amalgamate" --output "$folder/$name" msgen frf guard >/dev/null
+        ;;
+    esac
+    (cd "$folder/$name" && SERVOSCOPE=$program "$SERVOSCOPE_SOURCE/scripts/page-commands" "$page" --run >said 2>&1) || {
         cat "$folder/$name/said" >&2
         fail "the commands of $page"
     }
 done
-[ "$ran" -ge 4 ] || fail "only $ran pages have commands"
+[ "$ran" -ge 6 ] || fail "only $ran pages have commands"
 grep -q '^Explained: cogging' "$folder/quick-start/said" || fail "quick start: no cogging"
 grep -q '^Explained: coulomb friction' "$folder/commission-an-axis/said" || fail "commissioning: no friction"
 grep -q '^Explained: load bias' "$folder/your-own-data/said" || fail "own data: no bias"
 grep -q '^Explained: torque lag and load bias' "$folder/without-hardware/said" || fail "without hardware: no lag"
 
-# The effect of the guide is a whole file.
-awk '/^```$/ { inside = 0 } inside { print } /^```c$/ { inside = 1 }' "$docs/guides/add-a-cause.md" >"$folder/effect.c"
-grep -q sim_effect_quadratic_drag "$folder/effect.c" || fail "no effect in the guide"
-"${CC:-cc}" -std=c11 -Wall -Wextra -Wpedantic -Wshadow -Werror -fsyntax-only -I "$SERVOSCOPE_SOURCE" "$folder/effect.c" ||
-    fail "the effect of the guide"
+grep -q '^Explained: quadratic drag' "$folder/add-a-cause/said" || fail "add a cause: it is not found"
+awk -F, 'NR == 2 { near = $1 == 10 && $2 > 26.8 && $2 < 26.9 } NR > 1 { valid += $4 } END { exit !(near && valid == 40) }' \
+    "$folder/firmware/response.csv" || fail "firmware: another response than the page says"
+said=$("$folder/taught/servoscope" measure --drive 'can:none?profile=unknown' --table "$folder/quick-start/excitation.mst" \
+    --periods 1 --out "$folder/none.csv" 2>&1) && fail "a make that there is not is accepted"
+grep -q 'expected one of .*acme_one' <<<"$said" || fail "the make of the page is not among the known ones: $said"
+
+# Every subcommand, option, verb, benchmark and test that a page names is there.
+python3 - "$SERVOSCOPE_SOURCE" "$SERVOSCOPE" <<'END' || fail "names in the pages"
+import glob
+import os
+import re
+import subprocess
+import sys
+
+source, program = sys.argv[1:]
+
+
+def say(*arguments):
+    return subprocess.run([program, *arguments], check=True, capture_output=True, text=True).stdout
+
+
+def stems(pattern, cut=0):
+    return [os.path.basename(path)[cut:].rsplit(".", 1)[0] for path in glob.glob(os.path.join(source, pattern))]
+
+
+helps = {name: say(name, "--help") for name in re.findall(r"^  ([a-z]+) ", say("--help"), re.M)}
+with open(os.path.join(source, "run"), encoding="utf-8") as file:
+    verbs = re.search(r"^build \|.*\)", file.read(), re.M).group(0).rstrip(")").split(" | ")
+benches = [path.removesuffix(".sh") for path in os.listdir(os.path.join(source, "bench"))
+           if os.access(os.path.join(source, "bench", path), os.X_OK)] + ["NAME"]
+tests = ["hidden_effects"] + [f"{folder}/{stem}" for folder in ("unit", "api", "fault", "golden")
+                              for stem in stems(f"tests/{folder}/test_*.c", len("test_"))]
+tests += [f"{folder}/{stem}" for folder in ("cli", "golden") for stem in stems(f"tests/{folder}/*.sh")]
+wrong, checked = [], 0
+pages = [os.path.join(source, name) for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md")]
+for page in pages + glob.glob(os.path.join(source, "docs", "**", "*.md"), recursive=True):
+    with open(page, encoding="utf-8") as file:
+        text = file.read()
+    blocks = re.findall(r"^ *```\w*\n(.*?)^ *```", text, re.M | re.S)
+    blocks += re.findall(r"`([^`\n]+)`", re.sub(r"^ *```.*?^ *```", "", text, flags=re.M | re.S))
+    for line in "\n".join(blocks).replace("\\\n", " ").split("\n"):
+        for name, rest in re.findall(r"\bservoscope ([a-z]+)\b((?:(?! and )[^|;#()])*)", line):
+            options = re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", rest)
+            known = helps.get(name, "") + "--help --json --quiet"
+            wrong += [f"{page}: servoscope {name} {option}" for option in options if option not in known]
+            wrong += [] if name in helps else [f"{page}: servoscope {name}"]
+            checked += 1 + len(options)
+        for verb, name in re.findall(r"\./run ([a-z]+)(?: ([\w-]+))?", line):
+            if verb not in verbs or (verb == "bench" and name and name not in benches):
+                wrong.append(f"{page}: ./run {verb} {name}")
+            checked += 1
+        for choice in re.findall(r" -R '?([^' ]+)'?", line):
+            wrong += [f"{page}: no test is called {part}" for part in choice.split("|")
+                      if not any(re.search(part, test) for test in tests)]
+            checked += 1
+print("\n".join(wrong), file=sys.stderr)
+sys.exit(1 if wrong or checked < 200 else 0)
+END
 
 # Every link between pages leads somewhere.
 while IFS=: read -r page link; do

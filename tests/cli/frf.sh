@@ -228,6 +228,6 @@ refuse 1 'cut.csv.gz:' cut.csv.gz --out x.csv
 refuse 1 'damaged.csv.gz:' damaged.csv.gz --out x.csv
 refuse 1 'nothere.csv: cannot be read: No such file' nothere.csv --out x.csv
 refuse 1 'folder: is a folder, a file name was expected' run1.csv --out x.csv --report folder
-refuse 1 '/dev/full: writing failed' run1.csv --out x.csv --report /dev/full
+refuse 1 '/dev/full: cannot be written: No space left on device' run1.csv --out x.csv --report /dev/full
 
 [ "$failures" -eq 0 ]

@@ -21,10 +21,13 @@ complete_words() { # complete_words WORD...: what bash offers for the last one
 source completion.bash
 [ "$(complete_words servoscope diag)" = diagnose ] || fail "diag: $(complete_words servoscope diag)"
 [ "$(complete_words servoscope frf --meth)" = --method ] || fail "frf --meth"
+[ "$(complete_words servoscope manual tu)" = tune ] || fail "manual tu"
+[ "$(complete_words servoscope help frf)" = frf ] || fail "help frf"
+[ "$(complete_words servoscope completion z)" = zsh ] || fail "completion z"
 [[ $(complete_words servoscope design --lim) == *--limit-velocity-m-per-s* ]] || fail "design --lim"
 
 # Every offered option is one that the subcommand takes: a refusal speaks of its value, or of what is missing.
-mapfile -t names < <(complete_words servoscope '' | grep -v -- --)
+mapfile -t names < <(complete_words servoscope '' | grep -vx -e '--.*' -e help)
 [ "${#names[@]}" -ge 11 ] || fail "only ${#names[@]} subcommands"
 for name in "${names[@]}"; do
     "$SERVOSCOPE" "$name" --help >help
@@ -52,6 +55,14 @@ for name in "${names[@]}"; do
         "$SERVOSCOPE" "$name" "--$option=" >/dev/null 2>err || true
         grep -q "unknown option" err || grep -qx -- "--$option" offered || fail "$name takes --$option, and its help does not name it"
     done <taken
+done
+
+# The other shells' scripts offer the same.
+for name in "${names[@]}"; do
+    complete_words servoscope "$name" -- | sort -u >offered
+    "$SERVOSCOPE" completion zsh | sed -n "s/^    $name) compadd -- \(.*\) ;;$/\1/p" | tr ' ' '\n' | sort -u | cmp - offered || fail "zsh: $name"
+    "$SERVOSCOPE" completion fish | sed -n "s/.*__fish_seen_subcommand_from $name' -l \([^ ]*\).*/--\1/p" | sort -u | cmp - offered ||
+        fail "fish: $name"
 done
 
 # A word that is misspelt is answered with the one that was meant, if there is one.
@@ -84,6 +95,8 @@ for name in "${names[@]}"; do
     for section in NAME SYNOPSIS EXAMPLES 'EXIT STATUS'; do
         grep -qx "\.SH $section" page.1 || fail "manual page of $name: no $section"
     done
+    awk '/^\.SH SYNOPSIS/ { inside = 1; next } /^\.SH/ { inside = 0 } inside && /^servoscope / { print }' page.1 >synopsis
+    [ "$(wc -l <synopsis)" -eq "$("$SERVOSCOPE" "$name" --help | grep -cE '^(usage:|      ) servoscope ')" ] || fail "synopsis of $name: $(cat synopsis)"
     grep -q "servoscope\\\\*-$name" servoscope.1 || fail "$name is not on the program's page"
     cat page.1
 done | grep '^[.]' | grep -vE '^\.(TH|SH|TP|B|BR|I|nf|fi)( |$)' && fail "the line above is no request of a manual page"

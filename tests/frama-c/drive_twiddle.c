@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The integer DFTs of 24-bit samples and over quarter and two-level tables: any samples that the variant's width holds,
  * and any factors, coarse points too, that a table may hold. Of the fine turns what frf/two_level.h says is taken for
- * granted: below a tenth of their scale. Samples that 24 bits do not hold are all of a call's or none: that each is found
- * is the tests' to show. */
+ * granted: below a tenth of their scale. Samples that 24 bits do not hold are all of a call's or none: that each is
+ * found is the tests' to show. */
 #include "tests/frama-c/any.h"
 
 #include "frf/dft.h"

@@ -127,9 +127,9 @@ def offered():
     lines = subprocess.run([program, "completion", "fish"], capture_output=True, text=True, check=True).stdout.splitlines()
     options = {}
     for line in lines:
-        if " -a " in line:
+        if "__fish_use_subcommand" in line:
             options.setdefault(line.split(" -a ")[1].split()[0], set())
-        if "__fish_seen_subcommand_from" in line:
+        if " -l " in line:
             name = line.split("__fish_seen_subcommand_from ")[1].split("'")[0]
             options.setdefault(name, set()).add(line.split(" -l ")[1].split()[0])
     return {name: taken - {"json", "quiet", "help"} for name, taken in options.items()}

@@ -31,8 +31,8 @@ void setUp(void)
     for (uint32_t k = 0; k < line_count; k++) {
         bins[k] = 2 * (k + 1);
     }
-    request = (struct design_request){.rate_numerator_hz = 1000,
-                                      .rate_denominator = 2,
+    request = (struct design_request){.rate_num_hz = 1000,
+                                      .rate_den = 2,
                                       .period_samples = 1000,
                                       .bin_count = line_count,
                                       .bins = bins,

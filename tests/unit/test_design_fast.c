@@ -22,8 +22,8 @@ void setUp(void)
     for (uint32_t k = 0; k < line_count; k++) {
         bins[k] = k + 1;
     }
-    request = (struct design_request){.rate_numerator_hz = 300,
-                                      .rate_denominator = 1,
+    request = (struct design_request){.rate_num_hz = 300,
+                                      .rate_den = 1,
                                       .period_samples = period,
                                       .bin_count = line_count,
                                       .bins = bins,

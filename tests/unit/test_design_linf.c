@@ -24,8 +24,8 @@ void setUp(void)
         bins[k] = k + 1;
     }
     stop = 0;
-    request = (struct design_request){.rate_numerator_hz = period,
-                                      .rate_denominator = 1,
+    request = (struct design_request){.rate_num_hz = period,
+                                      .rate_den = 1,
                                       .period_samples = period,
                                       .bin_count = line_count,
                                       .bins = bins,

@@ -26,8 +26,8 @@ static double x[variables_max];
 
 void setUp(void)
 {
-    request = (struct design_request){.rate_numerator_hz = 1000,
-                                      .rate_denominator = 1,
+    request = (struct design_request){.rate_num_hz = 1000,
+                                      .rate_den = 1,
                                       .period_samples = period,
                                       .bin_count = lines,
                                       .bins = bins,

@@ -25,8 +25,8 @@ void setUp(void)
         bins[k] = 1 + k;
     }
     request = (struct design_request){
-        .rate_numerator_hz = 1000,
-        .rate_denominator = 1,
+        .rate_num_hz = 1000,
+        .rate_den = 1,
         .period_samples = length,
         .bin_count = lines,
         .bins = bins,

@@ -37,8 +37,8 @@ static void make_table(void)
     struct table made;
     TEST_ASSERT_EQUAL_INT_MESSAGE(
         0, table_alloc(&made, (uint32_t)design.period_samples, 3, (uint32_t)design.bin_count, &error), error.message);
-    made.rate_num_hz = request.rate_numerator_hz;
-    made.rate_den = request.rate_denominator;
+    made.rate_num_hz = request.rate_num_hz;
+    made.rate_den = request.rate_den;
     made.start_index = (uint32_t)design.start_index;
     made.travel_per_period = design.travel_per_period_rad;
     memcpy(made.bins, design.bins, design.bin_count * sizeof *made.bins);
@@ -60,8 +60,8 @@ void setUp(void)
         bins[k] = 1 + 2 * k;
     }
     request = (struct design_request){
-        .rate_numerator_hz = 1000,
-        .rate_denominator = 1,
+        .rate_num_hz = 1000,
+        .rate_den = 1,
         .period_samples = length,
         .bin_count = lines,
         .bins = bins,

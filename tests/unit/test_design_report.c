@@ -17,8 +17,8 @@ static char *text;
 void setUp(void)
 {
     request = (struct design_request){
-        .rate_numerator_hz = 1000,
-        .rate_denominator = 1,
+        .rate_num_hz = 1000,
+        .rate_den = 1,
         .period_samples = 200,
         .bin_count = sizeof bins / sizeof bins[0],
         .bins = bins,
@@ -91,7 +91,7 @@ static void test_design_report_warns_where_a_limit_is_passed_between_samples(voi
     tearDown();
     request.grid = design_grid_samples;
     request.period_samples = 20; // few samples for eight lines
-    request.rate_numerator_hz = 100;
+    request.rate_num_hz = 100;
     write_section();
     TEST_ASSERT_TRUE(result.peak_continuous.torque_Nm > 1.001);
     says("Beyond a limit between the samples");

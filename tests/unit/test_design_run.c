@@ -24,8 +24,8 @@ void setUp(void)
     for (uint32_t k = 0; k < line_count; k++) {
         bins[k] = k + 1;
     }
-    request = (struct design_request){.rate_numerator_hz = 400,
-                                      .rate_denominator = 1,
+    request = (struct design_request){.rate_num_hz = 400,
+                                      .rate_den = 1,
                                       .period_samples = period,
                                       .bin_count = line_count,
                                       .bins = bins,
@@ -294,7 +294,7 @@ static void test_run_refuses_lines_that_make_no_sense(void)
     request.period_samples = 3;
     assert_refused("period: 3 samples, expected 4 to");
     setUp();
-    request.rate_denominator = 0;
+    request.rate_den = 0;
     assert_refused("rate: 400/0");
     setUp();
     request.method = "newton";

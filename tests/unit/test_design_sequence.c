@@ -253,8 +253,8 @@ static void test_sequence_refused_with_what_would_do(void)
 static double peak_over_root(const struct design_line_grid *grid, const struct design_lines *lines)
 {
     struct design_result result;
-    struct design_request request = {.rate_numerator_hz = (uint32_t)grid->rate_hz,
-                                     .rate_denominator = 1,
+    struct design_request request = {.rate_num_hz = (uint32_t)grid->rate_hz,
+                                     .rate_den = 1,
                                      .period_samples = grid->period_samples,
                                      .bin_count = lines->count,
                                      .bins = lines->bins,

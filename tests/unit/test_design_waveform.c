@@ -22,8 +22,8 @@ static struct design_spectrum spectrum;
 void setUp(void)
 {
     request = (struct design_request){
-        .rate_numerator_hz = grid,
-        .rate_denominator = 1,
+        .rate_num_hz = grid,
+        .rate_den = 1,
         .period_samples = grid,
         .bin_count = lines,
         .bins = bins,
@@ -68,8 +68,8 @@ static void test_bound_of_the_testbed(void)
     for (uint32_t k = 0; k < 200; k++) {
         all[k] = k + 1;
     }
-    request = (struct design_request){.rate_numerator_hz = 1000,
-                                      .rate_denominator = 1,
+    request = (struct design_request){.rate_num_hz = 1000,
+                                      .rate_den = 1,
                                       .period_samples = 2000,
                                       .bin_count = 200,
                                       .bins = all,

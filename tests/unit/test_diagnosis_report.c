@@ -88,7 +88,8 @@ static void test_diagnosis_report_says_what_stays_unexplained(void)
     sample_unexplained(&diagnosis);
     report();
     has("Not explained as a whole: cogging stands");
-    has("31.0 % of the given model&#39;s misfit stays: 0.8..3 Hz, moving left, after 9 s.");
+    has("31.0 % of the given model&#39;s misfit stays (5.72 times what noise makes): 0.8..3 Hz, moving left, after 9 "
+        "s.");
     has("What might be, without being claimed");
     has_not("Nothing that stands out of the noise");
 }

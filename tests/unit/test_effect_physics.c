@@ -85,6 +85,26 @@ static void test_presliding_takes_the_energy_of_its_curve(void)
     TEST_ASSERT_TRUE(plant.position > 50.0 * distance);
 }
 
+/// From rest on, what is missing of the level is (1 - (1 - n) x / distance)^(1 / (1 - n)) with Dahl's exponent n, and
+/// with n below 1 nothing from an end on.
+static void test_presliding_follows_its_exponent(void)
+{
+    const double Fc = 0.05, distance = 2e-3;
+    model.coulomb_friction_Nm = Fc;
+    for (int i = 0; i < 2; i++) {
+        sim_plant_init(&plant, 0.0);
+        switch_on("presliding", distance, i == 0 ? 0.5 : 2.0, 0.0);
+        prepare(substep_s);
+        plant.velocity = 3.0;
+        for (size_t n = 0; n < 30; n++) {
+            move(0.0, 1);
+            double way = plant.position / distance, left = fmax(1.0 - 0.5 * way, 0.0);
+            double missing = i == 0 ? left * left : 1.0 / (1.0 + way);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-9, Fc * (1.0 - missing), plant.bristle);
+        }
+    }
+}
+
 /// Far below its level friction is a spring of Fc / distance.
 static void test_presliding_is_a_spring_for_small_motion(void)
 {
@@ -507,6 +527,7 @@ static void test_usual_substep_is_short_enough_for_every_effect(void)
                  {"position_dependent_stiffness", 0.2, 0.0, 0.0, 1e-7},
                  {"hardening_stiffness", 1e5, 0.0, 0.0, 1e-6},
                  {"backlash", 2e-3, 0.0, 0.0, 1e-5},
+                 {"backlash", 5e-5, 0.0, 0.0, 1e-5}, // passed through within a substep
                  {"periodic_disturbance", 0.05, 0.3, 11.0, 1e-7},
                  {"friction_drift", 0.5, 0.2, 0.0, 1e-7}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -553,6 +574,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_presliding_takes_the_energy_of_its_curve);
+    RUN_TEST(test_presliding_follows_its_exponent);
     RUN_TEST(test_presliding_is_a_spring_for_small_motion);
     RUN_TEST(test_presliding_follows_its_equation_through_reversals);
     RUN_TEST(test_presliding_holds_below_its_level);

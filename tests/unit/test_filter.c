@@ -19,7 +19,7 @@ void setUp(void) {}
 
 void tearDown(void) {}
 
-/// Response of the sections to exp(j pi f n), f in units of half the sampling rate.
+/// Response of the sections to exp(j pi f n), f in units of half the sample rate.
 static double complex response(const struct filter *filter, double f)
 {
     double complex delay = cexp(-I * pi * f), product = 1.0;

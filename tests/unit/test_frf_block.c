@@ -177,7 +177,7 @@ static double worst_snr(uint32_t period, double *out_mean)
     return worst;
 }
 
-/* share: highest line, of the sampling rate */
+/* share: highest line, of the sample rate */
 static void expect_snr(const struct frf_block_layout *layout, double share)
 {
     static const uint32_t periods[] = {2000, 2003, 16384, 65536};

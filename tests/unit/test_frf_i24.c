@@ -361,9 +361,9 @@ static uint32_t common_divisor(uint32_t a, uint32_t b)
 }
 
 /* What 24 bits of arithmetic leave of 24-bit data. A factor is off by up to half a step, 1/12 of a step squared on
- * average in each of its parts. Bin k sees M = N/g entries of the table, g = gcd(k, N): the errors repeat after M samples,
- * so only lines at multiples of g reach the bin. A quarter of a turn makes j of a factor and of its error, so if 4
- * divides M it is every fourth of these multiples (if 2 does, every second), four times as much of each. A line is
+ * average in each of its parts. Bin k sees M = N/g entries of the table, g = gcd(k, N): the errors repeat after M
+ * samples, so only lines at multiples of g reach the bin. A quarter of a turn makes j of a factor and of its error, so
+ * if 4 divides M it is every fourth of these multiples (if 2 does, every second), four times as much of each. A line is
  * N A / 2, as the bin's own is, and with its mirror image two: if s of them reach the bin,
  *
  *     mean SNR = 6 M F^2 / (q s),    q = 4, 2, 1;    F = 2^23 - 1;    over all bins about 3 N F^2 / K

@@ -360,6 +360,7 @@ static void test_two_level_factors_on_the_axes_are_not_beyond_one(void)
         TEST_ASSERT_EQUAL_INT(core_ok,
                               frf_two_level_build_q31(words.coarse_q31, FRF_COARSE_POINTS(period), words.fine_q31,
                                                       FRF_FINE_TURNS(period), period, &two_level.q31));
+        TEST_ASSERT_EQUAL_UINT32(FRF_GROUP_BITS(period), two_level.q31.group_bits);
         for (uint32_t q = 0; q < 4; q++) {
             if (q * period % 4 != 0)
                 continue;
@@ -513,9 +514,9 @@ static double worst_snr_dB(enum kind kind, enum frf_number number, uint32_t peri
     return worst;
 }
 
-/* Q15 and Q23 round once, as the full table does, and are required what it is. A Q31 factor carries its group's error too,
- * the same for B neighbours: N/B errors where the full table has N, each with as much power as all B of its own, and of
- * low bins many lines reach them. So at worst
+/* Q15 and Q23 round once, as the full table does, and are required what it is. A Q31 factor carries its group's error
+ * too, the same for B neighbours: N/B errors where the full table has N, each with as much power as all B of its own,
+ * and of low bins many lines reach them. So at worst
  *
  *     mean SNR = 3 (N/B) F^2 / K:   193.8, 196.7, 199.6 dB for N = 2000, 16384, 65536 and 35, 37, 38 lines
  *

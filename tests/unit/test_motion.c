@@ -20,7 +20,7 @@ static double position[rows], velocity[rows], out_position[rows], out_velocity[r
 static struct stretch out;
 static char text[160];
 
-/// A motion of some lines up to a fortieth of the sampling rate, whole periods of all of them.
+/// A motion of some lines up to a fortieth of the sample rate, whole periods of all of them.
 void setUp(void)
 {
     static const double lines_hz[] = {1.0, 3.0, 7.0, 15.0, 25.0};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/// The command line's options: tools/servoscope/options.h. The parser belongs to no room, so its sources are part of this
-/// test.
+/// The command line's options: tools/servoscope/options.h. The parser belongs to no room, so its sources are part of
+/// this test.
 #include "tools/servoscope/options.c"
 #include "tools/servoscope/suggest.c"
 

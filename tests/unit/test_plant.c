@@ -416,6 +416,67 @@ static void test_plant_inner_steps_keep_a_stiff_belt_stable(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.0, plant.position - plant.load_position);
 }
 
+// ---- Torque that changes within a step
+
+/// Reference number n, held for a sample.
+static double reference(size_t n)
+{
+    return 0.4 * sin(0.9 * (double)n) + 0.1 * (double)(n * n % 7) - 0.3;
+}
+
+/// Where motor and load are after 200 samples behind a dead time and a lag, in 400 steps a sample.
+static struct sim_plant driven_finely(double delay, double lag)
+{
+    enum { parts = 400 };
+    struct sim_stepper stepper;
+    double torque = 0.0, step = 1.0 / parts;
+    sim_stepper_init(&stepper, &model, step / model.sample_rate_hz);
+    sim_plant_init(&plant, 0.0);
+    for (size_t i = 0; i < 200 * parts; i++) {
+        double since = ((double)i + 0.5) * step - delay, held = since > 0.0 ? reference((size_t)since) : 0.0;
+        double next = held + (torque - held) * exp(-step / lag);
+        sim_plant_move(&plant, &stepper, held + (torque - next) * lag / step);
+        torque = next;
+    }
+    return plant;
+}
+
+/// The same in usual substeps; `course`: not only by their mean torques.
+static struct sim_plant driven_usually(bool course)
+{
+    struct sim_stepper stepper;
+    struct sim_actuator actuator;
+    sim_stepper_init(&stepper, &model, 1.0 / (sim_substeps * model.sample_rate_hz));
+    sim_plant_init(&plant, 0.0);
+    sim_actuator_init(&actuator);
+    for (size_t n = 0; n < 200; n++) {
+        sim_actuator_hold(&actuator, reference(n));
+        for (size_t i = 0; i < sim_substeps; i++)
+            if (course)
+                sim_plant_drive(&plant, &stepper, &actuator, i, 0.0);
+            else
+                sim_plant_move(&plant, &stepper, sim_actuator_substep(&actuator, &stepper, i));
+    }
+    return plant;
+}
+
+static void test_plant_driven_in_usual_substeps_follows_the_torques_course(void)
+{
+    two_masses(60.0, 0.03);
+    model.dead_time_s = 0.15 / model.sample_rate_hz; // begins within a substep
+    model.torque_lag_s = 0.4 / model.sample_rate_hz;
+    struct sim_plant exact = driven_finely(0.15, 0.4), means = driven_usually(false), course = driven_usually(true);
+    // Of what the mean torques are off by: what is left is of a higher order of the step.
+    const double part = 0.05, of_position = 0.3;
+    TEST_ASSERT_TRUE(fabs(means.velocity - exact.velocity) > 1e-6);
+    TEST_ASSERT_DOUBLE_WITHIN(part * fabs(means.velocity - exact.velocity), exact.velocity, course.velocity);
+    TEST_ASSERT_DOUBLE_WITHIN(part * fabs(means.load_velocity - exact.load_velocity), exact.load_velocity,
+                              course.load_velocity);
+    TEST_ASSERT_DOUBLE_WITHIN(part * fabs(means.load_position - exact.load_position), exact.load_position,
+                              course.load_position);
+    TEST_ASSERT_DOUBLE_WITHIN(of_position * fabs(means.position - exact.position), exact.position, course.position);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -440,5 +501,6 @@ int main(void)
     RUN_TEST(test_plant_substep_is_short_enough_for_reversals);
     RUN_TEST(test_plant_substep_is_short_enough_for_sticking);
     RUN_TEST(test_plant_inner_steps_keep_a_stiff_belt_stable);
+    RUN_TEST(test_plant_driven_in_usual_substeps_follows_the_torques_course);
     return UNITY_END();
 }

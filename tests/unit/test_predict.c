@@ -12,7 +12,7 @@
 enum { period = 800, settle = 60, rows = period * (settle + 1) };
 
 static const double two_pi = 6.283185307179586;
-/// Nm, of torques of about 0.5 Nm: rounding of speeds of about 20 rad/s times inertia and sampling rate.
+/// Nm, of torques of about 0.5 Nm: rounding of speeds of about 20 rad/s times inertia and sample rate.
 static const double rounding = 1e-9;
 /// Nm: what the prediction of effects that are not linear may be off by, which it takes as they are half way through a
 /// substep. A good torque sensor has ten times as much noise.

@@ -25,8 +25,8 @@ void setUp(void)
 {
     for (uint32_t i = 0; i < line_count; i++)
         bins[i] = 1 + 2 * i;
-    design = (struct design_request){.rate_numerator_hz = 500,
-                                     .rate_denominator = 1,
+    design = (struct design_request){.rate_num_hz = 500,
+                                     .rate_den = 1,
                                      .period_samples = period,
                                      .bin_count = line_count,
                                      .bins = bins,

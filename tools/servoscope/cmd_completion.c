@@ -33,9 +33,16 @@ static void print_bash(void)
           "        mapfile -t COMPREPLY < <(compgen -W '",
           stdout);
     print_names();
-    fputs(" --help --version' -- \"$word\")\n"
+    fputs(" help --help --version' -- \"$word\")\n"
           "        return\n"
           "    fi\n"
+          "    case ${COMP_WORDS[1]} in\n"
+          "    manual | help) [[ $word == -* ]] || mapfile -t COMPREPLY < <(compgen -W '",
+          stdout);
+    print_names();
+    fputs("' -- \"$word\") ;;\n"
+          "    completion) [[ $word == -* ]] || mapfile -t COMPREPLY < <(compgen -W 'bash zsh fish' -- \"$word\") ;;\n"
+          "    esac\n"
           "    [[ $word == -* ]] || return\n"
           "    case ${COMP_WORDS[1]} in\n",
           stdout);
@@ -82,7 +89,11 @@ static void print_zsh(void)
           "        return\n"
           "    fi\n"
           "    if [[ ${words[CURRENT]} != -* ]]; then\n"
-          "        _files\n"
+          "        case ${words[2]} in\n"
+          "        manual | help) _describe subcommand subcommands ;;\n"
+          "        completion) compadd -- bash zsh fish ;;\n"
+          "        *) _files ;;\n"
+          "        esac\n"
           "        return\n"
           "    fi\n"
           "    case ${words[2]} in\n",
@@ -100,6 +111,11 @@ static void print_zsh(void)
 
 static void print_fish(void)
 {
+    fputs("complete -c servoscope -n '__fish_seen_subcommand_from completion' -f -a 'bash zsh fish'\n"
+          "complete -c servoscope -n '__fish_seen_subcommand_from manual help' -f -a '",
+          stdout);
+    print_names();
+    fputs("'\n", stdout);
     for (size_t i = 0; commands[i]; i++) {
         struct help_option options[help_options_max];
         const size_t count = help_text_all_options(commands[i], options);

@@ -109,8 +109,8 @@ static int design(struct demo *self, struct error *out_error)
         char prefix[path_size];
         struct design_request *request = &self->requests[r];
         *request = (struct design_request){
-            .rate_numerator_hz = (uint32_t)rate_hz,
-            .rate_denominator = 1,
+            .rate_num_hz = (uint32_t)rate_hz,
+            .rate_den = 1,
             .period_samples = period_samples,
             .bin_count = self->lines.count,
             .bins = self->lines.bins,

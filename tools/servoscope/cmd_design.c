@@ -98,7 +98,7 @@ static int check_outputs(const struct design_options *options, struct error *out
 
 static double table_period_s(const struct work *self, size_t period_samples)
 {
-    return (double)period_samples * self->request.rate_denominator / self->request.rate_numerator_hz;
+    return (double)period_samples * self->request.rate_den / self->request.rate_num_hz;
 }
 
 static double settle_time_s(const struct work *self, size_t period_samples)
@@ -224,7 +224,7 @@ static int design_multisine(struct work *self, struct error *out_error)
     struct design_lines lines;
     double *shape = NULL;
     const struct design_line_grid grid = {
-        .rate_hz = (double)request->rate_numerator_hz / request->rate_denominator,
+        .rate_hz = (double)request->rate_num_hz / request->rate_den,
         .period_samples = request->period_samples,
     };
     const bool separate = self->options->separate != NULL;
@@ -393,17 +393,17 @@ const struct command command_cmd_design = {
             "          none         at sample 0\n"
             "  --mode cascade       references for position, velocity and torque (default), or torque alone\n"
             "  --stroke RAD:P       a slow sinusoidal travel of P periods of the multisine (--stroke-m M:P)\n"
-            "  --bias-velocity V    a constant speed in rad/s against stiction (--bias-velocity-m-per-s V)\n"
-            "\n"
-            "What to expect of a measurement:\n"
-            "  --periods P          counted periods (default 10; of a sequence: averaging factor)\n"
-            "  --settle-time S      for settling (default one period)\n"
-            "  --predict MODEL.json expected standard deviation of the response, with the model's noise\n"
-            "\n"
-            "  --report FILE.html   a page: the period against its limits, the spectrum, the figures\n"
-            "  --dft-header KINDS   PREFIX-dft.h, const tables for a firmware that measures with this table: block,\n"
-            "                       folded (the period folded where the lines allow it), q15, q31, with commas\n",
+            "  --bias-velocity V    a constant speed in rad/s against stiction (--bias-velocity-m-per-s V)\n",
     .more_help =
+        "\n"
+        "What to expect of a measurement:\n"
+        "  --periods P          counted periods (default 10; of a sequence: averaging factor)\n"
+        "  --settle-time S      for settling (default one period)\n"
+        "  --predict MODEL.json expected standard deviation of the response, with the model's noise\n"
+        "\n"
+        "  --report FILE.html   a page: the period against its limits, the spectrum, the figures\n"
+        "  --dft-header KINDS   PREFIX-dft.h, const tables for a firmware that measures with this table: block,\n"
+        "                       folded (the period folded where the lines allow it), q15, q31, with commas\n"
         "\n"
         "Telling two causes apart that a diagnosis could not:\n"
         "  --separate A,B       cause ids, as in diagnose: tries the excitation as given, other levels, higher lines,\n"

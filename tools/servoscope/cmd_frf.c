@@ -18,6 +18,7 @@
 #include "tools/servoscope/command.h"
 #include "tools/servoscope/comparing.h"
 #include "tools/servoscope/estimating_matrix.h"
+#include "tools/servoscope/estimating_options.h"
 #include "tools/servoscope/estimating_outcome.h"
 #include "tools/servoscope/estimating_page.h"
 #include "tools/servoscope/estimating_pieces.h"
@@ -31,193 +32,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-struct arguments {
-    struct option_values runs;
-    struct option_values compare; ///< saved responses
-    const char *method;
-    const char *settle;
-    const char *input;
-    const char *output;
-    const char *reference;
-    const char *lines;
-    const char *map;
-    const char *out;
-    const char *report;
-    const char *order;
-    const char *domain;
-    const char *model_out;
-    const char *design;
-    const char *hold;
-    bool delay_free;
-    double delay_s;
-    double rate_hz;
-    long long period_samples;
-    long long half_width;
-    long long segment_samples;
-};
-
-/// What is asked of every run.
-struct request {
-    const struct estimate_method *method;
-    struct periodic_options cut;
-    struct estimate_options tuning;
-    enum setup_hold hold;
-    struct estimating_matrix *matrix;
-    const struct command_context *context;
-    const struct run_sequence_segment *segment; ///< of a sequence that the run is part of; NULL: it is a run by itself
-};
-
-static int read_options(int argc, char **argv, struct arguments *out, struct error *out_error)
-{
-    const struct option options[] = {
-        {.name = "method", .kind = option_text, .target = &out->method},
-        {.name = "settle", .kind = option_text, .target = &out->settle},
-        {.name = "input", .kind = option_text, .target = &out->input},
-        {.name = "output", .kind = option_text, .target = &out->output},
-        {.name = "reference", .kind = option_text, .target = &out->reference},
-        {.name = "lines", .kind = option_text, .target = &out->lines},
-        {.name = "map", .kind = option_text, .target = &out->map},
-        {.name = "rate", .kind = option_positive, .target = &out->rate_hz},
-        {.name = "period", .kind = option_integer, .target = &out->period_samples, .lowest = 3, .highest = 1e9},
-        {.name = "order", .kind = option_text, .target = &out->order},
-        {.name = "half-width", .kind = option_integer, .target = &out->half_width, .lowest = 1, .highest = 1e6},
-        {.name = "segment", .kind = option_integer, .target = &out->segment_samples, .lowest = 16, .highest = 1e9},
-        {.name = "domain", .kind = option_text, .target = &out->domain},
-        {.name = "delay-free", .kind = option_flag, .target = &out->delay_free},
-        {.name = "model-out", .kind = option_text, .target = &out->model_out},
-        {.name = "design", .kind = option_text, .target = &out->design},
-        {.name = "hold", .kind = option_text, .target = &out->hold},
-        {.name = "delay", .kind = option_number, .target = &out->delay_s, .highest = 1e6},
-        {.name = "compare", .kind = option_list, .target = &out->compare},
-        {.name = "out", .kind = option_text, .target = &out->out},
-        {.name = "report", .kind = option_text, .target = &out->report},
-    };
-    const struct option_operands operands = {"RUN.csv", 1, option_values_max, &out->runs};
-    return options_parse(argc, argv, options, sizeof options / sizeof options[0], &operands, out_error);
-}
-
-static int read_settle(const struct arguments *arguments, struct periodic_options *io_options, struct error *out_error)
-{
-    if (!arguments->settle) {
-        return 0;
-    }
-    if (strcmp(arguments->settle, "auto") == 0) {
-        io_options->settle = periodic_settle_auto;
-        return 0;
-    }
-    double periods = 0.0;
-    if (options_parse_number("--settle", arguments->settle, &periods, NULL) ||
-        !(periods >= 0.0 && periods <= 1e9 && periods == floor(periods))) {
-        return error_set(out_error, error_usage, "--settle: '%s', expected a whole number of periods or auto",
-                         arguments->settle);
-    }
-    io_options->settle = periodic_settle_given;
-    io_options->settle_periods = (size_t)periods;
-    return 0;
-}
-
-static int read_order(const struct arguments *arguments, struct estimate_options *io_options, struct error *out_error)
-{
-    double order = estimate_order_auto;
-    if (arguments->order && strcmp(arguments->order, "auto") != 0 &&
-        (options_parse_number("--order", arguments->order, &order, NULL) ||
-         !(order >= 0.0 && order <= estimate_order_max && order == floor(order)))) {
-        return error_set(out_error, error_usage, "--order: '%s', expected a whole number from 0 to %d or auto",
-                         arguments->order, estimate_order_max);
-    }
-    io_options->order = (int)order;
-    return 0;
-}
-
-/// What would change nothing is refused, lest somebody believe that it did.
-static int check_used(const struct arguments *arguments, struct error *out_error)
-{
-    const struct {
-        const char *name;
-        bool given;
-        const char *methods;
-    } options[] = {
-        {"order", arguments->order != NULL, "lpm"},
-        {"half-width", arguments->half_width > 0, "lpm"},
-        {"segment", arguments->segment_samples > 0, "lpm, h1, indirect"},
-        {"reference", arguments->reference != NULL, "lpm, h1, indirect"},
-    };
-    for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
-        if (options[i].given && !strstr(options[i].methods, arguments->method)) {
-            return error_set(out_error, error_usage, "--%s is for --method %s, not %s", options[i].name,
-                             options[i].methods, arguments->method);
-        }
-    }
-    return 0;
-}
-
-/// What is for method parametric alone.
-static int read_parametric(const struct arguments *arguments, enum setup_hold hold, struct estimate_options *io_options,
-                           struct error *out_error)
-{
-    const char *given = arguments->domain       ? "domain"
-                        : arguments->delay_free ? "delay-free"
-                        : arguments->model_out  ? "model-out"
-                                                : NULL;
-    if (given && strcmp(arguments->method, "parametric") != 0) {
-        return error_set(out_error, error_usage, "--%s is for --method parametric, not %s", given, arguments->method);
-    }
-    const char *usual = hold == setup_zoh ? "discrete" : "continuous";
-    const char *domain = arguments->domain ? arguments->domain : usual;
-    if (strcmp(domain, "discrete") != 0 && strcmp(domain, "continuous") != 0) {
-        return error_set(out_error, error_usage, "--domain: '%s', expected discrete or continuous", domain);
-    }
-    io_options->continuous = strcmp(domain, "continuous") == 0;
-    io_options->held = hold == setup_zoh;
-    io_options->delay_free = arguments->delay_free;
-    return 0;
-}
-
-static int read_request(const struct arguments *arguments, struct request *out_request, struct error *out_error)
-{
-    *out_request = (struct request){
-        .method = estimate_method_find(arguments->method, out_error),
-        .cut = {.input = arguments->input,
-                .output = arguments->output,
-                .reference = arguments->reference,
-                .period_samples = (size_t)arguments->period_samples},
-        .tuning = {.half_width = (size_t)arguments->half_width, .segment_samples = (size_t)arguments->segment_samples},
-    };
-    if (!out_request->method) {
-        return error_usage;
-    }
-    out_request->cut.settle = out_request->method->models_transient ? periodic_settle_keep : periodic_settle_default;
-    int status = arguments->hold ? setup_hold_parse(arguments->hold, &out_request->hold, out_error) : 0;
-    status = status ? status : check_used(arguments, out_error);
-    status = status ? status : read_order(arguments, &out_request->tuning, out_error);
-    status = status ? status : read_parametric(arguments, out_request->hold, &out_request->tuning, out_error);
-    return status ? status : read_settle(arguments, &out_request->cut, out_error);
-}
-
-/// --lines needs the run's rate and period, so that it is read once per run.
-static int read_lines(const struct arguments *arguments, const struct run *run, struct periodic_options *io_options,
-                      struct design_lines *out_lines, struct error *out_error)
-{
-    *out_lines = (struct design_lines){0};
-    if (!arguments->lines) {
-        return 0;
-    }
-    const struct design_line_grid grid = {
-        .rate_hz = run->sample_rate_hz,
-        .period_samples = io_options->period_samples ? io_options->period_samples : run->period_samples,
-    };
-    if (grid.period_samples == 0) {
-        return error_set(out_error, error_usage, "--lines: %s does not say its period, give --period SAMPLES too",
-                         run->path);
-    }
-    int status = design_lines_parse(arguments->lines, &grid, 1, out_lines, out_error);
-    io_options->bins = out_lines->bins;
-    io_options->bin_count = out_lines->count;
-    return status;
-}
-
 /// A model by itself is no measurement: the page shows it beside the lines that it was fitted to.
-static int estimate_by(const struct request *request, const struct periodic *recording, struct frf *out_frf,
+static int estimate_by(const struct estimating_request *request, const struct periodic *recording, struct frf *out_frf,
                        struct estimating_summary *io_summary, struct error *out_error)
 {
     struct estimate_options tuning = request->tuning;
@@ -235,7 +51,7 @@ static int estimate_by(const struct request *request, const struct periodic *rec
     return status;
 }
 
-static int estimate_without_period(const struct run *run, const struct request *request, struct frf *out_frf,
+static int estimate_without_period(const struct run *run, const struct estimating_request *request, struct frf *out_frf,
                                    struct estimating_summary *out_summary, struct error *out_error)
 {
     const struct arbitrary_options options = {
@@ -254,8 +70,9 @@ static int estimate_without_period(const struct run *run, const struct request *
     return request->method->estimate_arbitrary(&recording, &request->tuning, out_frf, out_error);
 }
 
-static int estimate_periods(const struct run *run, const struct request *request, const struct inputs *inputs,
-                            struct frf *out_frf, struct estimating_summary *out_summary, struct error *out_error)
+static int estimate_periods(const struct run *run, const struct estimating_request *request,
+                            const struct inputs *inputs, struct frf *out_frf, struct estimating_summary *out_summary,
+                            struct error *out_error)
 {
     struct clocked clocked;
     const struct periodic *recording = &clocked.recording;
@@ -285,7 +102,7 @@ static int estimate_periods(const struct run *run, const struct request *request
     return status;
 }
 
-static int estimate_run(const char *path, const struct arguments *arguments, struct request request,
+static int estimate_run(const char *path, const struct estimating_options *arguments, struct estimating_request request,
                         struct frf *out_frf, struct estimating_summary *out_summary, struct error *out_error)
 {
     const struct run_options run_options = {.map = arguments->map,
@@ -304,7 +121,7 @@ static int estimate_run(const char *path, const struct arguments *arguments, str
     const struct run *run = &pieces.run;
     pieces.context = request.context;
     status = estimating_matrix_begin(request.matrix, run, out_error);
-    status = status ? status : read_lines(arguments, run, &request.cut, &lines, out_error);
+    status = status ? status : estimating_options_lines(arguments, run, &request.cut, &lines, out_error);
     status = status ? status : estimating_matrix_lines(request.matrix, run, &request.cut, &inputs, out_error);
     if (!status && request.segment) {
         status = estimating_check_table(run, request.segment, out_error);
@@ -327,8 +144,8 @@ static int estimate_run(const char *path, const struct arguments *arguments, str
 
 /// The runs of a sequence on their way through estimate_run().
 struct segments_context {
-    const struct arguments *arguments;
-    const struct request *request;
+    const struct estimating_options *arguments;
+    const struct estimating_request *request;
     struct estimating_summary *whole;
 };
 
@@ -336,7 +153,7 @@ static int estimate_segment(void *context, const char *path, const struct run_se
                             struct frf *out_frf, struct error *out_error)
 {
     const struct segments_context *self = context;
-    struct request request = *self->request;
+    struct estimating_request request = *self->request;
     struct estimating_summary one = {.used = 0};
     request.segment = segment;
     int status = estimate_run(path, self->arguments, request, out_frf, &one, out_error);
@@ -354,8 +171,9 @@ static int estimate_segment(void *context, const char *path, const struct run_se
 }
 
 /// A run, or all runs of the manifest of a sequence as one.
-static int estimate_source(const char *path, const struct arguments *arguments, const struct request *request,
-                           struct frf *out_frf, struct estimating_summary *out_summary, struct error *out_error)
+static int estimate_source(const char *path, const struct estimating_options *arguments,
+                           const struct estimating_request *request, struct frf *out_frf,
+                           struct estimating_summary *out_summary, struct error *out_error)
 {
     if (!manifest_is(path)) {
         return estimate_run(path, arguments, *request, out_frf, out_summary, out_error);
@@ -379,7 +197,7 @@ static int print_json(cJSON *object, struct error *out_error)
 }
 
 /// The model of method parametric, for --model-out.
-static int write_model(const struct arguments *arguments, const struct estimating_outcome *outcome,
+static int write_model(const struct estimating_options *arguments, const struct estimating_outcome *outcome,
                        struct error *out_error)
 {
     const struct parametric_outcome *found = outcome->runs[0].parametric;
@@ -394,8 +212,8 @@ static int write_model(const struct arguments *arguments, const struct estimatin
 }
 
 /// Writes everything that was asked for. The page, which is the largest, is put in place last, once the rest is there.
-static int write_files(const struct arguments *arguments, const struct estimating_page_item *items, size_t count,
-                       struct error *out_error)
+static int write_files(const struct estimating_options *arguments, const struct estimating_page_item *items,
+                       size_t count, struct error *out_error)
 {
     struct atomic_file page = {NULL, NULL, NULL};
     int status = 0;
@@ -413,7 +231,7 @@ static int write_files(const struct arguments *arguments, const struct estimatin
     return atomic_file_commit(&page, out_error);
 }
 
-static int say_outcome(const struct arguments *arguments, const struct estimating_outcome *outcome,
+static int say_outcome(const struct estimating_options *arguments, const struct estimating_outcome *outcome,
                        const struct comparing *compared, const struct command_context *context, struct error *out_error)
 {
     if (context->json) {
@@ -430,7 +248,7 @@ static int say_outcome(const struct arguments *arguments, const struct estimatin
     return comparing_print(compared, &outcome->frf, arguments->out, out_error);
 }
 
-static int write_and_report(const struct arguments *arguments, const struct estimating_outcome *outcome,
+static int write_and_report(const struct estimating_options *arguments, const struct estimating_outcome *outcome,
                             const struct command_context *context, struct error *out_error)
 {
     struct comparing compared = {0};
@@ -467,8 +285,8 @@ static int refuse_by_name(const struct error *reason, const struct option_values
 }
 
 /// Several runs are realisations, but for those of the same excitation.
-static int combine(const struct arguments *arguments, struct frf *responses, struct estimating_outcome *io_outcome,
-                   struct error *out_error)
+static int combine(const struct estimating_options *arguments, struct frf *responses,
+                   struct estimating_outcome *io_outcome, struct error *out_error)
 {
     const size_t count = arguments->runs.count;
     if (count == 1) {
@@ -491,7 +309,7 @@ static int combine(const struct arguments *arguments, struct frf *responses, str
 }
 
 /// What the response is one of, and what its runs show beside it, as its keys.
-static int finish(const struct arguments *arguments, const struct request *request,
+static int finish(const struct estimating_options *arguments, const struct estimating_request *request,
                   struct estimating_outcome *io_outcome, struct error *out_error)
 {
     bool done = true;
@@ -517,14 +335,14 @@ static int finish(const struct arguments *arguments, const struct request *reque
 }
 
 /// Runs of a sequence or realisations have one model, of the response that they give together.
-static bool fits_afterwards(const struct arguments *arguments, const struct request *request)
+static bool fits_afterwards(const struct estimating_options *arguments, const struct estimating_request *request)
 {
     return strcmp(request->method->name, "parametric") == 0 &&
            (arguments->runs.count > 1 || manifest_is(arguments->runs.items[0]));
 }
 
 /// Replaces the response by that of the model fitted to it, which is kept with the first run.
-static int fit_afterwards(const struct arguments *arguments, const struct request *request,
+static int fit_afterwards(const struct estimating_options *arguments, const struct estimating_request *request,
                           struct estimating_outcome *io_outcome, struct error *out_error)
 {
     struct estimating_summary *first = &io_outcome->runs[0];
@@ -539,12 +357,12 @@ static int fit_afterwards(const struct arguments *arguments, const struct reques
     return frf_parametric_fit(&first->measured, arguments->runs.items[0], &tuning, &io_outcome->frf, out_error);
 }
 
-static int estimate_all(const struct arguments *arguments, const struct request *asked, struct estimating_outcome *out,
-                        struct error *out_error)
+static int estimate_all(const struct estimating_options *arguments, const struct estimating_request *asked,
+                        struct estimating_outcome *out, struct error *out_error)
 {
     const bool afterwards = fits_afterwards(arguments, asked);
-    struct request of_runs = *asked;
-    const struct request *request = &of_runs;
+    struct estimating_request of_runs = *asked;
+    const struct estimating_request *request = &of_runs;
     if (afterwards) {
         of_runs.method = estimate_method_find("mean", NULL);
     }
@@ -565,13 +383,14 @@ static int estimate_all(const struct arguments *arguments, const struct request 
 }
 
 /// One output from one input of a machine with several.
-static int estimate_pair(const struct arguments *arguments, const struct request *request, size_t pair,
-                         struct arguments *out_pair, struct estimating_outcome *out, struct error *out_error)
+static int estimate_pair(const struct estimating_options *arguments, const struct estimating_request *request,
+                         size_t pair, struct estimating_options *out_pair, struct estimating_outcome *out,
+                         struct error *out_error)
 {
     const struct estimating_matrix *matrix = request->matrix;
     const size_t output = pair / matrix->input_count;
     const size_t input = pair % matrix->input_count;
-    struct request one = *request;
+    struct estimating_request one = *request;
     char *path = estimating_matrix_path(matrix, arguments->out, output, input);
     *out_pair = *arguments;
     out_pair->out = path;
@@ -585,8 +404,8 @@ static int estimate_pair(const struct arguments *arguments, const struct request
     return status ? status : estimate_all(out_pair, &one, out, out_error);
 }
 
-static cJSON *json_of_pairs(const struct arguments *arguments, const struct estimating_matrix *matrix,
-                            const struct arguments *pairs, const struct estimating_outcome *outcomes)
+static cJSON *json_of_pairs(const struct estimating_options *arguments, const struct estimating_matrix *matrix,
+                            const struct estimating_options *pairs, const struct estimating_outcome *outcomes)
 {
     cJSON *object = cJSON_CreateObject();
     cJSON_AddStringToObject(object, "out", arguments->out);
@@ -605,8 +424,8 @@ static cJSON *json_of_pairs(const struct arguments *arguments, const struct esti
     return object;
 }
 
-static int report_pairs(const struct arguments *arguments, const struct estimating_matrix *matrix,
-                        const struct arguments *pairs, const struct estimating_outcome *outcomes,
+static int report_pairs(const struct estimating_options *arguments, const struct estimating_matrix *matrix,
+                        const struct estimating_options *pairs, const struct estimating_outcome *outcomes,
                         const struct command_context *context, struct error *out_error)
 {
     const size_t count = matrix->input_count * matrix->output_count;
@@ -626,7 +445,7 @@ static int report_pairs(const struct arguments *arguments, const struct estimati
     return status;
 }
 
-static int estimate_matrix(const struct arguments *arguments, const struct request *request,
+static int estimate_matrix(const struct estimating_options *arguments, const struct estimating_request *request,
                            const struct command_context *context, struct error *out_error)
 {
     const size_t count = request->matrix->input_count * request->matrix->output_count;
@@ -635,7 +454,7 @@ static int estimate_matrix(const struct arguments *arguments, const struct reque
                          "--%s: there are %zu responses, expected --input COLUMN and --output COLUMN too",
                          arguments->model_out ? "model-out" : "compare", count);
     }
-    struct arguments *pairs = calloc(count, sizeof *pairs);
+    struct estimating_options *pairs = calloc(count, sizeof *pairs);
     struct estimating_outcome *outcomes = calloc(count, sizeof *outcomes);
     int status = pairs && outcomes ? 0 : error_set(out_error, error_refused, "memory is short");
     for (size_t i = 0; i < count && !status; i++) {
@@ -651,7 +470,7 @@ static int estimate_matrix(const struct arguments *arguments, const struct reque
     return status;
 }
 
-static int estimate_and_report(const struct arguments *arguments, const struct request *request,
+static int estimate_and_report(const struct estimating_options *arguments, const struct estimating_request *request,
                                const struct command_context *context, struct error *out_error)
 {
     struct estimating_outcome outcome;
@@ -666,7 +485,7 @@ static int estimate_and_report(const struct arguments *arguments, const struct r
 }
 
 /// The outputs against everything that is read.
-static int check_outputs(const struct arguments *arguments, struct error *out_error)
+static int check_outputs(const struct estimating_options *arguments, struct error *out_error)
 {
     const char *outputs[] = {arguments->out, arguments->report, arguments->model_out};
     int status = outputs_check(arguments->runs.items, arguments->runs.count, outputs, 3, out_error);
@@ -674,7 +493,7 @@ static int check_outputs(const struct arguments *arguments, struct error *out_er
 }
 
 /// Responses in the place of runs: nothing is to be estimated.
-static int compare_saved(const struct arguments *arguments, const struct command_context *context,
+static int compare_saved(const struct estimating_options *arguments, const struct command_context *context,
                          struct error *out_error)
 {
     const struct comparing_request request = {&arguments->runs, &arguments->compare, arguments->report};
@@ -687,11 +506,11 @@ static int compare_saved(const struct arguments *arguments, const struct command
 
 static int run(int argc, char **argv, const struct command_context *context, struct error *out_error)
 {
-    struct arguments arguments = {.method = "mean"};
+    struct estimating_options arguments = {.method = "mean"};
     struct estimating_matrix matrix = {.allowed = false};
-    struct request request;
-    int status = read_options(argc, argv, &arguments, out_error);
-    status = status ? status : read_request(&arguments, &request, out_error);
+    struct estimating_request request;
+    int status = estimating_options_read(argc, argv, &arguments, out_error);
+    status = status ? status : estimating_request_make(&arguments, &request, out_error);
     status = status ? status : check_outputs(&arguments, out_error);
     if (!status && frf_file_is(arguments.runs.items[0])) {
         return compare_saved(&arguments, context, out_error);

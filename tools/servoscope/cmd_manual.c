@@ -66,31 +66,41 @@ static bool begins_with(const struct help_line *line, const char *start)
     return line->length >= strlen(start) && memcmp(line->text, start, strlen(start)) == 0;
 }
 
+static const char synopsis[] = "SYNOPSIS", description[] = "DESCRIPTION", examples[] = "EXAMPLES";
+
+/// The section that a line belongs to, behind one of `section`: the synopsis ends with a blank line.
+static const char *section_of(const struct help_line *line, const char *section, bool after_blank)
+{
+    if (begins_with(line, "usage: ")) {
+        return synopsis;
+    }
+    if (begins_with(line, "example")) {
+        return examples;
+    }
+    return section == synopsis && after_blank && line->length > 0 ? description : section;
+}
+
 /// The page keeps the layout of the help: it is written for lines of a terminal, and its columns carry meaning.
 static void print_body(const struct command *command)
 {
+    static const char usage[] = "usage: ", usage_again[] = "       ";
     struct help_line line;
     const char *at = NULL;
     const char *section = NULL;
-    bool first = true;
+    bool after_blank = false;
+    help_text_next(command, &at, &line); /* "servoscope NAME: summary" */
     while (help_text_next(command, &at, &line)) {
-        if (first) {
-            first = false; /* "servoscope NAME: summary" */
-            continue;
-        }
-        const char *wanted = begins_with(&line, "usage: ")   ? "SYNOPSIS"
-                             : begins_with(&line, "example") ? "EXAMPLES"
-                             : !section || strcmp(section, "SYNOPSIS") == 0
-                                 ? (line.length > 0 && section ? "DESCRIPTION" : section)
-                                 : section;
-        if (wanted != section && wanted) {
+        const char *wanted = section_of(&line, section, after_blank);
+        after_blank = line.length == 0;
+        if (wanted != section) {
             printf("%s.SH %s\n.nf\n", section ? ".fi\n" : "", wanted);
             section = wanted;
         }
         if (!section) {
             continue;
         }
-        const size_t skip = begins_with(&line, "usage: ") ? strlen("usage: ") : 0;
+        const bool used = begins_with(&line, usage) || (section == synopsis && begins_with(&line, usage_again));
+        const size_t skip = used ? strlen(usage) : 0;
         print_text(line.text + skip, line.length - skip);
     }
     fputs(section ? ".fi\n" : "", stdout);

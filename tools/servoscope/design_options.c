@@ -100,8 +100,8 @@ static int read_rate(const char *text, struct design_request *request, struct er
     if (table_set_rate(&table, rate_hz, out_error)) {
         return error_usage;
     }
-    request->rate_numerator_hz = table.rate_num_hz;
-    request->rate_denominator = table.rate_den;
+    request->rate_num_hz = table.rate_num_hz;
+    request->rate_den = table.rate_den;
     return 0;
 }
 

@@ -22,7 +22,7 @@ static cJSON *json_of_peaks(const struct design_peaks *peaks, bool linear)
 
 static double period_seconds(const struct design_summary *self)
 {
-    return (double)self->result->period_samples * self->request->rate_denominator / self->request->rate_numerator_hz;
+    return (double)self->result->period_samples * self->request->rate_den / self->request->rate_num_hz;
 }
 
 /// How many of the lines are hit by what, and how many bins stay free to show it; null if memory is short.

@@ -23,8 +23,8 @@ int designing_table(const struct design_request *request, const struct design_re
     if (status) {
         return status;
     }
-    out_table->rate_num_hz = request->rate_numerator_hz;
-    out_table->rate_den = request->rate_denominator;
+    out_table->rate_num_hz = request->rate_num_hz;
+    out_table->rate_den = request->rate_den;
     out_table->start_index = (uint32_t)result->start_index;
     out_table->linear = request->linear;
     out_table->travel_per_period = result->travel_per_period_rad;
@@ -61,7 +61,7 @@ int designing_report(const char *path, const char *prefix, const struct design_r
                      const struct design_result *result, struct error *out_error)
 {
     const char *name = manifest_name_of(prefix);
-    const double rate_hz = (double)request->rate_numerator_hz / request->rate_denominator;
+    const double rate_hz = (double)request->rate_num_hz / request->rate_den;
     char title[192], subtitle[320];
     struct atomic_file file;
     struct page page;

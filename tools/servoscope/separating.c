@@ -58,7 +58,7 @@ int separating_prepare(const struct design_options *options, const struct design
     status = status ? status : model_file_read(options->model, &out_self->model, out_error);
     if (status)
         return status;
-    double rate_hz = (double)request->rate_numerator_hz / request->rate_denominator;
+    double rate_hz = (double)request->rate_num_hz / request->rate_den;
     if (out_self->model.linear != request->linear)
         return error_set(out_error, error_refused, "--model: %s is of a %s axis, the limits are of a %s one",
                          options->model, out_self->model.linear ? "linear" : "rotary",

@@ -126,7 +126,7 @@ static int start(struct work *self, struct error *out_error)
     const struct design_request *design = request->design;
     struct sequences_summary *summary = self->summary;
     const struct design_line_grid grid = {
-        .rate_hz = (double)design->rate_numerator_hz / design->rate_denominator,
+        .rate_hz = (double)design->rate_num_hz / design->rate_den,
         .period_samples = design->period_samples,
     };
     self->path_size = strlen(request->prefix) + 64;

@@ -10,8 +10,8 @@ static size_t least(size_t a, size_t b)
     return a < b ? a : b;
 }
 
-/// Letters to be changed, left out, put in or swapped with a neighbour (optimal string alignment): the three last rows of
-/// its table are enough.
+/// Letters to be changed, left out, put in or swapped with a neighbour (optimal string alignment): the three last rows
+/// of its table are enough.
 static size_t distance_between(const char *a, size_t a_length, const char *b, size_t b_length)
 {
     size_t rows[3][length_max + 1];
