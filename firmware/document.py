@@ -104,6 +104,26 @@ def headroom(figures):
                   "of a period, 16 kHz"], rows)
 
 
+LINES = (("", "any, L = 32"), ("any-cut/", "the same, N no whole blocks"),
+         ("below-0.1/", "below 0.1 of the sample rate, L = 64"), ("below-0.02/", "below 0.02 of it, L = 128"),
+         ("odd/", "odd, folded, L = 32"))
+
+
+def spread(figures):
+    """A call per frame, the work spread: mean, longest, and what that is of the mean."""
+    rows = []
+    for name, words in LINES:
+        for channels in CHANNELS:
+            row = [words, channels]
+            for bins in BINS:
+                what = f"{name}{bins}-bins/{channels}-channel{'s' if channels > 1 else ''}"
+                mean, longest, percent = (instructions(figures, f"frf_block_add_i16/spread-{kind}/{what}")
+                                          for kind in ("mean", "longest", "longest-percent-of-mean"))
+                row.append(f"{mean} / {longest} ({percent / 100:.2f})")
+            rows.append(row)
+    return table(["lines", "channels"] + [f"{bins} bins" for bins in BINS], rows)
+
+
 def line_through(figures, what):
     """Instructions per sample and channel as a + b K, from the fewest and the most bins with two channels."""
     first, last = (block(figures, what, bins, 2) / 2 for bins in (BINS[0], BINS[-1]))
@@ -133,7 +153,8 @@ def fft(figures):
 
 def write(figures):
     text = PAGE.read_text(encoding="utf-8")
-    for name, make in (("counted", counted), ("twiddles", twiddles), ("memory", memory), ("headroom", headroom), ("fft", fft)):
+    for name, make in (("counted", counted), ("twiddles", twiddles), ("memory", memory), ("headroom", headroom), ("spread", spread),
+                       ("fft", fft)):
         mark = re.compile(rf"(<!-- {name}: .*?-->\n).*?(<!-- end -->)", re.S)
         if not mark.search(text):
             raise SystemExit(f"document: {PAGE.name}: no place for the table '{name}'")

@@ -369,27 +369,63 @@ static bool hangs_loose(const struct state *s, const struct sim_stepper *stepper
     return belt.twist == 0.0 && belt.twist_rate == 0.0;
 }
 
+/// What a gap takes of the twist: half of it, to the side on which the belt pulls; all of the twist where it hangs loose.
+static double taken_twist(const struct state *s, const struct sim_stepper *stepper)
+{
+    return s->position[0] - s->position[1] - belt_of(s, stepper).twist;
+}
+
 /// Side of a gap in the belt on which it pulls; 0 where it hangs loose, and where it has no gap.
 static int pulled_side(const struct state *s, const struct sim_stepper *stepper)
 {
-    struct sim_belt belt = belt_of(s, stepper);
-    double taken = s->position[0] - s->position[1] - belt.twist;
-    return belt.twist == 0.0 && belt.twist_rate == 0.0 ? 0 : sign_of(taken);
+    return hangs_loose(s, stepper) ? 0 : sign_of(taken_twist(s, stepper));
 }
 
-/// A step during which a belt may go slack, tight, or through its gap: near that instant in shorter steps.
+/// Moves to just behind the edge of the gap that is met first in a step of dt_s, which would end as `*next` says; false
+/// position, its end that stays halved (Illinois). Returns how long it took.
+static double step_to_edge(struct state *io, const struct sim_stepper *stepper, double torque, double dt_s,
+                           const struct state *next)
+{
+    enum { refinements = 8 };
+    const double close = 1e-9;
+    double edge = taken_twist(hangs_loose(io, stepper) ? next : io, stepper), low_s = 0.0, high_s = dt_s;
+    double low = io->position[0] - io->position[1] - edge, high = next->position[0] - next->position[1] - edge;
+    struct state end = *next;
+    for (int i = 0; i < refinements && low * high < 0.0 && high_s - low_s > close * dt_s; i++) {
+        struct state at = *io;
+        double at_s = low_s + (high_s - low_s) * low / (low - high);
+        step_with_reversal(&at, stepper, torque, at_s);
+        double here = at.position[0] - at.position[1] - edge;
+        if (here * low > 0.0) {
+            low_s = at_s;
+            low = here;
+            high *= 0.5;
+        } else {
+            high_s = at_s;
+            high = here;
+            low *= 0.5;
+            end = at;
+        }
+    }
+    *io = end;
+    return high_s;
+}
+
+/// A step during which a belt may go slack, tight, or through its gap: split there. The instants have to be exact, or
+/// what is predicted would jump with what moves them.
 static void step_belt(struct state *io, const struct sim_stepper *stepper, double torque, double dt_s)
 {
-    enum { parts = 16 };
-    struct state next = *io;
-    int side = pulled_side(io, stepper);
-    step_with_reversal(&next, stepper, torque, dt_s);
-    if (side == pulled_side(&next, stepper)) {
-        *io = next;
-        return;
+    enum { events_max = 6 };
+    double left_s = dt_s;
+    for (int event = 0; left_s > 0.0; event++) {
+        struct state next = *io;
+        step_with_reversal(&next, stepper, torque, left_s);
+        if (event == events_max || pulled_side(io, stepper) == pulled_side(&next, stepper)) {
+            *io = next;
+            return;
+        }
+        left_s -= step_to_edge(io, stepper, torque, left_s, &next);
     }
-    for (int i = 0; i < parts; i++)
-        step_with_reversal(io, stepper, torque, dt_s / parts);
 }
 
 /// Rate that friction which builds up asks for: of the motor swinging on it, and of the way in which it does so.

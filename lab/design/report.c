@@ -92,7 +92,7 @@ static void add_spectrum(struct page *page, const struct design_request *request
                                             "tightest limit binds.");
 }
 
-/// Names of the quantities that their limit holds back, "torque (99.9 % of 1 Nm) and velocity (99.5 % of 3 rad/s)", or of
+/// Names of the quantities that their limit holds back, "torque (99.9 % of 1 Nm), velocity (99.5 % of 3 rad/s)", or of
 /// all others that have one. Returns how many.
 static size_t write_limits(const struct report_row *rows, bool binding, size_t size, char *out_text)
 {

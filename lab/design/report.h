@@ -10,7 +10,7 @@
 /// it is played (from start_index on), amplitudes; how many products of second and third order fall on each bin; the
 /// start and what it leaves of a transient, beside all other starts; how it was made.
 /// Errors: if memory is short the figures are replaced by a sentence that says so.
-/// Cost:   that of design_start_choose() for periods of at most 32768 samples; longer ones are shown without other starts
+/// Cost:   that of design_start_choose() for periods of at most 32768 samples; longer ones show no other starts
 /// Test:   tests/unit/test_design_report.c
 void design_report_sections(struct page *page, const struct design_request *request,
                             const struct design_result *result);

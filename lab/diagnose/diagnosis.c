@@ -21,7 +21,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { refit_iterations = 10 };
+enum { refit_iterations = 10, settle_iterations = 3 }; ///< the second: of what was fitted under nearly that noise
 
 /// Everything a diagnosis works on; freed as one.
 struct work {
@@ -475,7 +475,8 @@ static bool settle_noise(struct work *w, struct hypothesis *h, struct sim_model 
     if (hidden_mass_concerns(&w->fit_data, h))
         return fit_hidden_mass(w, h, io_model);
     for (int pass = 0; pass < most; pass++) {
-        if (!estimate_fit_noise(w, io_model) || !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, refit_iterations))
+        if (!estimate_fit_noise(w, io_model) ||
+            !sharpen_noise(w->evidence, &w->fit_data, &w->fit, h, settle_iterations))
             return false;
         double before = fit_cost(&w->fit, &w->fit_data, h, h->x);
         if (!w->evidence[0].recording->periodic || !fit_run(&w->fit, &w->fit_data, h, refit_iterations) ||
@@ -612,10 +613,8 @@ static void list_causes(const struct work *w, struct diagnosis *d, const struct 
         bool stands = judgement->stands[e];
         size_t *count = stands ? &d->cause_count : &d->candidate_count;
         struct diagnosis_cause *list = stands ? d->causes : d->candidates;
-        if (*count == diagnosis_causes_max)
-            continue;
-        describe_cause(w, d, h, e, &list[*count]);
-        *count += stands || list[*count].evidence > 0.0; // what the fit does better without is no candidate
+        if (*count < diagnosis_causes_max)
+            describe_cause(w, d, h, e, &list[(*count)++]);
     }
     add_finding(&w->recordings[0], d);
     qsort(d->causes, d->cause_count, sizeof d->causes[0], stronger);

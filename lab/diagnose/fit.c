@@ -276,6 +276,90 @@ static bool take_step(struct fit *self, const struct fit_data *data, struct hypo
     return before - cost > settled;
 }
 
+/// Width of a secant: as far as the residual changes by `far` standard deviations, if that is a step that a derivative
+/// says anything about.
+static double secant_width(const struct fit *self, const struct hypothesis *h, size_t i)
+{
+    const double far = 5.0;
+    const struct coordinate *c = &h->coordinates[i];
+    double size = c->scale == coordinate_logarithmic ? 1.0 : fmax(fabs(h->x[i]), 0.3);
+    double slope = sqrt(sum_of_squares(self->rows, self->jacobian + i * self->rows) + c->weight * c->weight);
+    return fmin(fmax(far / slope, 5e-4 * size), 0.1 * size);
+}
+
+/// Columns of the Jacobian by secants about x, from the present ones' sizes. `work`: rows.
+static void take_secants(struct fit *self, const struct fit_data *data, const struct hypothesis *h, double *work)
+{
+    for (size_t i = 0; i < h->count; i++) {
+        double width = secant_width(self, h, i), *column = self->jacobian + i * self->rows;
+        double x[hypothesis_coordinates_max];
+        size_t rows;
+        memcpy(x, h->x, sizeof x);
+        double above = fmin(h->x[i] + width, h->coordinates[i].upper);
+        double below = fmax(h->x[i] - width, h->coordinates[i].lower);
+        if (!(above > below))
+            continue;
+        x[i] = above;
+        residual_at(data, h, x, column, &rows);
+        x[i] = below;
+        residual_at(data, h, x, work, &rows);
+        for (size_t j = 0; j < self->rows; j++)
+            column[j] = (column[j] - work[j]) / (above - below);
+    }
+}
+
+/// Takes the longest of the step and its halves that improves the fit. Returns by how much.
+static double take_part(struct fit *self, const struct fit_data *data, struct hypothesis *h, const double *x,
+                        double *trial)
+{
+    const double shortest = 0.1;
+    for (double part = 1.0; part > shortest; part *= 0.5) {
+        double y[hypothesis_coordinates_max], damping = 1e-3, before = self->cost;
+        bool taken;
+        for (size_t i = 0; i < h->count; i++)
+            y[i] = h->x[i] + part * (x[i] - h->x[i]);
+        take_step(self, data, h, y, trial, 0.0, &damping, &taken);
+        if (taken)
+            return before - self->cost;
+    }
+    return 0.0;
+}
+
+/// Goes on from where a fit ended whose residual is rough: derivatives are secants then, so that neither jumps nor kinks
+/// of single instants stop the fit or pass for information.
+static bool polish(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis)
+{
+    enum { most = 4 };
+    const double settled = 0.05;
+    size_t rows = data->values + data->contrasts;
+    double *work = malloc((rows * io_hypothesis->count + 2 * rows) * sizeof *work);
+    if (!work)
+        return false;
+    double *trial = work + rows * io_hypothesis->count + rows, x[hypothesis_coordinates_max];
+    bool good = true;
+    for (int pass = 0; good && pass < most; pass++) {
+        take_secants(self, data, io_hypothesis, trial);
+        good = solve_step(self, io_hypothesis, 0.0, farthest_step, work, x, self->covariance);
+        if (good && !(take_part(self, data, io_hypothesis, x, trial) > settled))
+            break;
+    }
+    self->prior = prior_cost(io_hypothesis, io_hypothesis->x);
+    free(work);
+    return good;
+}
+
+/// A belt that goes slack and tight does so at instants that jump with every number of the model. Where the noise follows
+/// the model, too, derivatives cost ten times as much and stay as they are.
+static bool is_rough(const struct fit_data *data, const struct hypothesis *h)
+{
+    struct sim_model model;
+    hypothesis_model(h, NULL, &model);
+    for (size_t e = 0; sim_effects[e]; e++)
+        if (model.effect_on[e] && sim_effects[e]->bend)
+            return !data->renewed;
+    return false;
+}
+
 static bool improve(struct fit *self, const struct fit_data *data, struct hypothesis *h, const struct lender *lender,
                     const struct course *course)
 {
@@ -307,6 +391,8 @@ static bool improve(struct fit *self, const struct fit_data *data, struct hypoth
             differentiate(self, data, h, lender);
         good = solve_step(self, h, 0.0, INFINITY, work, x, self->covariance);
     }
+    if (good && course->finish && is_rough(data, h))
+        good = polish(self, data, h);
     self->prior = prior_cost(h, h->x);
     free(work);
     return good;

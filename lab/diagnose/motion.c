@@ -253,6 +253,14 @@ static void say_contradiction(const struct agreement *a, char *out_text, size_t 
              a->gain, a->delay, hint);
 }
 
+/// Of a position that walks by what a noisy speed adds per sample and is measured with noise of its own, `ratio` of the
+/// two's deviations: the steady gain of the Kalman filter.
+static double position_gain(double ratio)
+{
+    const double only_position = 100.0;
+    return ratio < only_position ? 0.5 * ratio * (sqrt(ratio * ratio + 4.0) - ratio) : 1.0;
+}
+
 static bool from_both(size_t n, double rate_hz, const double *velocity, size_t period, const double *derivative,
                       struct stretch *out, char *out_text, size_t size)
 {
@@ -277,8 +285,11 @@ static bool from_both(size_t n, double rate_hz, const double *velocity, size_t p
     // (f / f_s)^2 of the speed. Below a fiftieth of the sample rate that is under a part in two thousand, and fades
     // fast.
     const double most = turn * 0.02;
-    double omega = fmax(sigma_p > 0.0 ? fmin(sigma_v / (sigma_p * rate_hz), most) : most, 1e-6);
-    if (blend(n, omega, sigma_v, period, derivative, velocity, out->velocity))
+    double ratio = sigma_p > 0.0 ? sigma_v / (sigma_p * rate_hz) : INFINITY;
+    double omega = fmax(fmin(ratio, most), 1e-6);
+    bool agree = blend(n, omega, sigma_v, period, derivative, velocity, out->velocity);
+    out->position_gain = agree ? position_gain(ratio) : 1.0;
+    if (agree)
         snprintf(out_text, size,
                  "Speed: from the position below %.3g Hz, from the speed column above, where each is less noisy.",
                  omega * rate_hz / turn);
@@ -332,6 +343,7 @@ bool motion_estimate(size_t rows, double rate_hz, const double *position, const 
         memcpy(out->position, longer.position, rows * sizeof(double));
         memcpy(out->velocity, longer.velocity, rows * sizeof(double));
         out->kinematics = longer.kinematics;
+        out->position_gain = longer.position_gain;
         longer.kinematics = NULL;
     }
     free(longer.kinematics);

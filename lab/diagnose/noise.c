@@ -21,8 +21,9 @@ bool evidence_init(struct evidence *self, const struct recording *recording, dou
     self->plan = fft_plan_create(n);
     self->covariance = calloc(4 * bins, sizeof(double));
     self->factor = calloc(4 * bins, sizeof(double));
+    self->between = calloc(4 * bins, sizeof(double));
     self->work = malloc((4 * n + 2 * n + 4 * bins) * sizeof(double));
-    if (self->plan && self->covariance && self->factor && self->work && contrast_init(&self->contrast, recording) &&
+    if (self->plan && self->covariance && self->factor && self->between && self->work && contrast_init(&self->contrast, recording) &&
         kinematics_init(self)) {
         self->values += self->kinematics.values;
         self->allowances = calloc(evidence_allowances * self->values, sizeof *self->allowances);
@@ -39,6 +40,7 @@ void evidence_free(struct evidence *self)
         fft_plan_destroy(self->plan);
     free(self->covariance);
     free(self->factor);
+    free(self->between);
     free(self->allowances);
     free(self->work);
     contrast_free(&self->contrast);
@@ -239,6 +241,7 @@ static void make_allowances(struct evidence *self)
     double *shape = self->work + 6 * n, *nothing = shape + 2 * bins;
     bool reference = self->channels == 2;
     self->allowance_count = 0;
+    allow(self, self->between, self->between + 2 * bins);
     memset(nothing, 0, 2 * bins * sizeof *nothing);
     evidence_transform(self, r->block.torque, shape);
     differentiate(bins, n, reference ? together : apart, 1, shape);
@@ -320,6 +323,24 @@ bool evidence_renew_noise(struct evidence *self, const struct sim_model *model)
     return good;
 }
 
+/// Where motion is not the same in every period and forces are no straight line of it (a reversal, a gap), the mean of
+/// the periods' forces is not the force of their mean motion. It is theirs as far as the motion differed, and the
+/// mean's as far as it was only measured to: half of the difference is taken, and the other half is allowed for.
+static bool compare_means(struct evidence *self, const struct sim_model *model, const double *mean)
+{
+    size_t n = self->recording->block.samples, bins = self->recording->band + 1;
+    double *both = malloc(2 * n * sizeof *both);
+    bool good = both && evidence_signals(self, model, both, both + n);
+    if (good) {
+        evidence_transform(self, both, self->between);
+        evidence_transform(self, both + n, self->between + 2 * bins);
+        for (size_t i = 0; i < 4 * bins; i++)
+            self->between[i] = 0.5 * (mean[i] - self->between[i]);
+    }
+    free(both);
+    return good;
+}
+
 /// What the periods of a run have in common is its block, what they do not is noise or an effect that depends on time.
 static bool noise_from_periods(struct evidence *self, const struct sim_model *model, double *raw)
 {
@@ -333,7 +354,8 @@ static bool noise_from_periods(struct evidence *self, const struct sim_model *mo
         smooth(self, raw);
         factorise(self);
         self->scatter = whitened_scatter(self, raw);
-        good = contrast_take(self, model, spectra, stride) && contrast_find_tones(self, both);
+        good = contrast_take(self, model, spectra, stride) && contrast_find_tones(self, both) &&
+               compare_means(self, model, spectra + r->periods * stride);
     }
     free(both);
     free(spectra);
@@ -419,7 +441,8 @@ bool evidence_sharpen_noise(struct evidence *self, const double *whitened)
     return true;
 }
 
-void evidence_whiten(const struct evidence *self, const double *mechanics, const double *actuator, double *out_whitened)
+static void whiten_with(const struct evidence *self, const double *mechanics, const double *actuator,
+                        const double *added, double *out_whitened)
 {
     const struct recording *r = self->recording;
     size_t bins = r->band + 1, n = r->block.samples;
@@ -429,8 +452,17 @@ void evidence_whiten(const struct evidence *self, const double *mechanics, const
         evidence_transform(self, actuator, a);
     else
         memset(a, 0, 2 * bins * sizeof *a);
+    for (size_t i = 0; added && i < 2 * bins; i++) {
+        m[i] += added[i];
+        a[i] += added[2 * bins + i];
+    }
     whiten_spectra(self, m, a, out_whitened);
     apply_allowances(self, out_whitened);
+}
+
+void evidence_whiten(const struct evidence *self, const double *mechanics, const double *actuator, double *out_whitened)
+{
+    whiten_with(self, mechanics, actuator, NULL, out_whitened);
 }
 
 /// Not a number everywhere: whoever sums squares finds out.
@@ -504,7 +536,7 @@ void evidence_residual(const struct evidence *self, const struct sim_model *mode
     double *actuator = self->channels == 2 ? mechanics + n : NULL;
     bool good = signals(self, model, mechanics, actuator, out_contrasts);
     if (good)
-        evidence_whiten(self, mechanics, actuator, out_whitened);
+        whiten_with(self, mechanics, actuator, self->between, out_whitened);
     if (!good || !kinematics_residual(self, model, out_whitened + self->values - self->kinematics.values))
         fail(self->values, out_whitened);
 }

@@ -10,7 +10,7 @@
 
 struct fft_plan;
 
-enum { evidence_allowances = 7 };
+enum { evidence_allowances = 8 };
 
 /// A recording with its noise: what a likelihood needs. Channels: mechanics, and actuator if there is a reference.
 struct evidence {
@@ -22,6 +22,8 @@ struct evidence {
     double *covariance; ///< per bin 0..band: S_mm, S_aa, Re S_am, Im S_am of the block's DFT divided by its length
     double *factor;     ///< per bin: inverse Cholesky factor, l_mm, l_aa, Re l_am, Im l_am
     double scatter;     ///< whitened squares of what differs between the periods, all summed; 0 without periods
+    double *between; ///< spectra, mechanics and actuator: half of what the mean of the periods' residuals has over that
+                     ///< of their mean; zeros without periods
     size_t allowance_count;
     double *allowances;                         ///< values each: unit vectors of what no cause is, but no noise either
     double allowance_kept[evidence_allowances]; ///< share that is kept of a residual along each, one after the other

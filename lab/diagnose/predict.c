@@ -16,6 +16,9 @@ struct predictor {
     struct sim_actuator actuator;
     size_t hidden; ///< states, 0, 2 or 4
     bool cyclic;
+    double gain; ///< of a measured position, beside the one that was reached
+    bool placed; ///< whether there is one
+    bool leaps;  ///< a period ends elsewhere than it begins
 };
 
 static bool is_lost(const struct stretch *s, size_t n)
@@ -35,7 +38,8 @@ static void move_measured(struct predictor *p, size_t n, size_t i)
     sim_plant_move_under(&p->plant, &p->stepper, &line);
 }
 
-/// Sets the motor to where the sensors saw it, unless they saw nothing.
+/// Sets the motor to where the sensors saw it, unless they saw nothing. What a speed column has taken a position to is
+/// less noisy for a while than the next position: a stiff belt, and a gap in it, feel the difference.
 static void place_motor(struct predictor *p, size_t n)
 {
     const struct stretch *s = p->stretch;
@@ -45,8 +49,10 @@ static void place_motor(struct predictor *p, size_t n)
     struct sim_motion motion = {.time_s = p->plant.time_s, .linear = p->stepper.model.linear};
     struct sim_sensed sensed = {.position = s->position[n], .velocity = s->velocity[n]};
     sim_stepper_unsense(&p->stepper, &sensed, &motion);
-    p->plant.position = motion.position;
+    bool anew = !p->placed || (n == 0 && p->leaps);
+    p->plant.position += (anew ? 1.0 : p->gain) * (motion.position - p->plant.position);
     p->plant.velocity = motion.velocity;
+    p->placed = true;
 }
 
 /// Speed that the sensors will say the motor has now.
@@ -257,6 +263,7 @@ static void warm_up(struct predictor *p)
     const double lags = 40.0; // exp(-40): nothing of the start is left
     double needed = fmax(sim_actuator_history + lags * p->stepper.lag_samples, (double)friction_memory(p));
     size_t history = needed < (double)samples ? (size_t)needed : samples;
+    p->placed = false;
     for (size_t n = samples - history; n < samples; n++)
         predict_sample(p, n);
 }
@@ -265,7 +272,12 @@ static void warm_up(struct predictor *p)
 
 static void start(struct predictor *p)
 {
-    double x[hidden_max];
+    const struct stretch *s = p->stretch;
+    double x[hidden_max], step_s = 1.0 / p->stepper.model.sample_rate_hz, farthest = 0.0;
+    for (size_t n = 0; n < s->samples; n++)
+        farthest = fmax(farthest, fabs(s->velocity[n]) * step_s);
+    p->gain = s->position_gain > 0.0 ? s->position_gain : 1.0;
+    p->leaps = fabs(s->position[0] - s->position[s->samples - 1]) > 2.0 * farthest;
     sim_plant_init(&p->plant, 0.0);
     place_motor(p, 0);
     for (size_t i = 0; i < hidden_max; i++)

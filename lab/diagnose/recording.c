@@ -203,6 +203,7 @@ static bool average(const struct recording *r, const double *all, size_t n, doub
 static bool make_block(struct recording *r, size_t n)
 {
     r->block.samples = n;
+    r->block.position_gain = r->all.position_gain;
     return average(r, r->all.torque_ref, n, &r->block.torque_ref) && average(r, r->all.torque, n, &r->block.torque) &&
            average(r, r->all.position, n, &r->block.position) && average(r, r->all.velocity, n, &r->block.velocity) &&
            average(r, r->all.kinematics, n, &r->block.kinematics);

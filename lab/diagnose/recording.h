@@ -22,6 +22,8 @@ struct stretch {
     double *torque;
     double *position;
     double *velocity;   ///< best estimate from the position and, if there is one, the speed column
+    double position_gain; ///< share that a measured position has in where the motor is, beside where it was and what
+                          ///< speed has taken it from there; 0 counts as 1: all of it
     double *kinematics; ///< speed column less the derivative of the position column; NULL: not both are there
     double start_s;     ///< time of the first sample since the run began; of a mean of periods the middle of them all,
                         ///< where the clock of effects that depend on time stands still

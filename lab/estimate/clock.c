@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/clock.h"
 
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include <complex.h>
@@ -31,11 +32,6 @@ static const double negligible_slip_rad = 0.05;
 static const double tolerated_difference = 0.1;
 /// One period's correlation with the next, below which they are not the same signal.
 static const double least_coherence = 0.5;
-
-static double power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
 
 /// One signal's spectra on the way.
 struct work {
@@ -99,7 +95,7 @@ static double correlate_consecutive(const struct work *self, double complex *out
         const double complex *after = self->spectra + m * lines;
         for (size_t b = 0; b < lines; b++) {
             out_product[b] += after[b] * conj(before[b]);
-            size += 0.5 * (power(before[b]) + power(after[b]));
+            size += 0.5 * (cmplx_power(before[b]) + cmplx_power(after[b]));
         }
     }
     return size;
@@ -161,13 +157,13 @@ static void measure_scatter(struct work *self)
     memset(own, 0, lines * sizeof *own);
     for (size_t m = 0; m < recording->used; m++) {
         for (size_t b = 0; b < lines; b++) {
-            own[b] += power(self->turned[m * lines + b] - self->mean[b]) / (double)(recording->used - 1);
+            own[b] += cmplx_power(self->turned[m * lines + b] - self->mean[b]) / (double)(recording->used - 1);
         }
     }
     for (size_t b = 0; b < lines; b++) {
         const size_t first = b > smoothed_lines ? b - smoothed_lines : 0;
         const size_t end = b + smoothed_lines + 1 < lines ? b + smoothed_lines + 1 : lines;
-        self->scatter[b] = rounding_power * power(self->mean[b]);
+        self->scatter[b] = rounding_power * cmplx_power(self->mean[b]);
         for (size_t other = first; other < end; other++) {
             self->scatter[b] += own[other] / (double)(end - first);
         }
@@ -178,7 +174,7 @@ static void measure_scatter(struct work *self)
 static double information_of(const struct work *self, size_t b)
 {
     const double w = radians_per_sample(self->recording, b);
-    return self->scatter[b] > 0.0 ? 2.0 * w * w * power(self->mean[b]) / self->scatter[b] : 0.0;
+    return self->scatter[b] > 0.0 ? 2.0 * w * w * cmplx_power(self->mean[b]) / self->scatter[b] : 0.0;
 }
 
 /// Returns the information of one period.
@@ -277,7 +273,7 @@ static struct clock_signal conclude(const struct work *self, const struct fit *f
     const double expected = information > 0.0 ? 1.0 / information : 0.0;
     double lines = 0.0;
     for (size_t b = 0; b < self->recording->bin_count; b++) {
-        lines += self->scatter[b] > 0.0 ? 2.0 * power(self->mean[b]) / self->scatter[b] : 0.0;
+        lines += self->scatter[b] > 0.0 ? 2.0 * cmplx_power(self->mean[b]) / self->scatter[b] : 0.0;
     }
     /* Radians per sample, RMS over lines by what they say of a delay. */
     const double slope = lines > 0.0 ? sqrt(information / lines) : 0.0;
@@ -342,7 +338,7 @@ static double relative_std_of(const struct periodic *recording, const double *in
 static void note_relative_scatter(const struct work *self, double *out)
 {
     for (size_t b = 0; b < self->recording->bin_count; b++) {
-        const double signal = power(self->mean[b]);
+        const double signal = cmplx_power(self->mean[b]);
         out[b] = signal > 0.0 ? self->scatter[b] / signal : 0.0;
     }
 }

@@ -14,7 +14,7 @@ double difference_chance(double degrees_of_freedom)
     return degrees_of_freedom > 0.0 ? statistics_f_tail(4.0, 2.0, degrees_of_freedom) : exp(-4.0);
 }
 
-/// One line that both have; `ratios_db` gains a number where neither is 0. Returns the distance over 2 std, NaN without.
+/// One line that both have; `ratios_db` gains a number where neither is 0. Returns the distance over 2 std, or NaN.
 static double compare(const struct frf *first, size_t i, const struct frf *other, size_t k, double *ratios_db,
                       size_t *io_ratios)
 {

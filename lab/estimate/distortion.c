@@ -27,11 +27,6 @@ struct free_bins {
     double *noise;  ///< s^2/M
 };
 
-static double power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
-
 static uint32_t common_divisor(uint32_t a, uint32_t b)
 {
     while (b != 0) {
@@ -237,7 +232,7 @@ static bool add_period(const struct periodic *recording, size_t period, bool is_
         io_sums->first[i] = is_first ? rest : io_sums->first[i];
         const double complex shifted = rest - io_sums->first[i];
         io_sums->sum[i] += shifted;
-        io_sums->square[i] += power(shifted);
+        io_sums->square[i] += cmplx_power(shifted);
     }
     return true;
 }
@@ -256,7 +251,7 @@ static double strongest_line(const struct periodic *recording)
 {
     double strongest = 0.0;
     for (size_t i = 0; i < recording->used * recording->bin_count; i++) {
-        strongest = fmax(strongest, power(recording->output_spectra[i]));
+        strongest = fmax(strongest, cmplx_power(recording->output_spectra[i]));
     }
     return strongest;
 }
@@ -275,9 +270,9 @@ static bool measure(const struct periodic *recording, const struct frf *frf, str
     }
     for (size_t i = 0; i < sums.count && done; i++) {
         const double complex mean = sums.sum[i] / periods;
-        const double scatter = fmax(sums.square[i] - periods * power(mean), 0.0) / (periods - 1.0);
+        const double scatter = fmax(sums.square[i] - periods * cmplx_power(mean), 0.0) / (periods - 1.0);
         io_bins->noise[i] = scatter / periods + rounding;
-        io_bins->excess[i] = power(sums.first[i] + mean) - io_bins->noise[i];
+        io_bins->excess[i] = cmplx_power(sums.first[i] + mean) - io_bins->noise[i];
     }
     free(sums.input);
     free(sums.square);

@@ -2,6 +2,7 @@
 #include "lab/estimate/excitation.h"
 
 #include "lab/estimate/circle.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/fft.h"
 
 #include <math.h>
@@ -20,11 +21,6 @@ static const double largest_missing = 0.3;
 static const double same_level = 0.1;
 /// Standard deviations that noise may move the level by.
 static const double level_stds = 4.0;
-
-static double power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
 
 bool excitation_take(const struct periodic *recording, struct excitation *out)
 {
@@ -58,7 +54,7 @@ static double size_of(const struct excitation *self)
 {
     double sum = 0.0;
     for (size_t b = 0; b < self->count; b++) {
-        sum += power(self->mean[b]);
+        sum += cmplx_power(self->mean[b]);
     }
     return sum;
 }

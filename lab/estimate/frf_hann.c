@@ -4,6 +4,7 @@
 #include "lab/estimate/circle.h"
 #include "lab/estimate/method.h"
 #include "lab/estimate/stretch.h"
+#include "lab/numeric/cmplx.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -37,8 +38,8 @@ static void estimate_line(const double complex *input, const double complex *out
     double count = 0.0;
     for (long m = -width; m <= width; m++) {
         if (m < -1 || m > 1) {
-            residual += stretch_power(windowed(output + m) - response * windowed(input + m));
-            input_scatter += stretch_power(windowed(input + m));
+            residual += cmplx_power(windowed(output + m) - response * windowed(input + m));
+            input_scatter += cmplx_power(windowed(input + m));
             count += 1.0;
         }
     }
@@ -46,7 +47,7 @@ static void estimate_line(const double complex *input, const double complex *out
     struct circle input_line = {(size_t)(count / correlation_loss(count / 2.0)) + 1, centre, 0.0};
     input_line.variance = input_scatter / count * (double)input_line.count;
     if (circle_chance_of_zero(&input_line) < estimate_chance_of_dead_line) {
-        estimate_set_line(io_frf, line, response, sqrt(residual / count / stretch_power(centre)));
+        estimate_set_line(io_frf, line, response, sqrt(residual / count / cmplx_power(centre)));
     }
 }
 

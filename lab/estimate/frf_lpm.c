@@ -5,6 +5,7 @@
 #include "lab/estimate/lpm_window.h"
 #include "lab/estimate/method.h"
 #include "lab/estimate/stretch.h"
+#include "lab/numeric/cmplx.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -83,8 +84,8 @@ static void fit_line(const struct lpm *self, const struct lpm_window *window, si
     double scatter = 0.0;
     double residual = 0.0;
     for (size_t i = 0; i < window->lines; i++) {
-        scatter += stretch_power(residuals[i]);
-        residual += stretch_power(output_residual[i] - response * residuals[i]);
+        scatter += cmplx_power(residuals[i]);
+        residual += cmplx_power(output_residual[i] - response * residuals[i]);
     }
     size_t dof = dof_of(io_attempt);
     double factor = (1.0 + window->leverage) / (double)dof;
@@ -92,7 +93,7 @@ static void fit_line(const struct lpm *self, const struct lpm_window *window, si
     struct circle input_line = {dof + 1, input, scatter * factor * (double)(dof + 1)};
     bool powered = circle_chance_of_zero(&input_line) < estimate_chance_of_dead_line;
     io_attempt->response[line] = response;
-    io_attempt->variance[line] = powered ? factor * residual / stretch_power(input) : -1.0;
+    io_attempt->variance[line] = powered ? factor * residual / cmplx_power(input) : -1.0;
 }
 
 static bool make_attempt(const struct lpm *self, struct attempt *io_attempt)

@@ -5,6 +5,7 @@
 #include "lab/estimate/complex_fit.h"
 #include "lab/estimate/method.h"
 #include "lab/estimate/spectra.h"
+#include "lab/numeric/cmplx.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -110,11 +111,6 @@ static void fill_columns(struct fit *io_self, size_t centre)
     }
 }
 
-static double power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
-
 static bool fit_line(struct fit *io_self, size_t centre, double complex *out_response, double *out_variance)
 {
     fill_columns(io_self, centre);
@@ -134,10 +130,10 @@ static bool fit_line(struct fit *io_self, size_t centre, double complex *out_res
     double scatter = 0.0;
     for (size_t i = 0; i < io_self->rows; i++) {
         double complex input = io_self->input ? io_self->input_values[i] : 0.0;
-        residual += power(io_self->output_values[i] - *out_response * input);
-        scatter += power(input);
+        residual += cmplx_power(io_self->output_values[i] - *out_response * input);
+        scatter += cmplx_power(input);
     }
-    *out_variance = factor * residual / power(to_input);
+    *out_variance = factor * residual / cmplx_power(to_input);
     struct circle input_line = {io_self->dof + 1, to_input, scatter * factor * (double)(io_self->dof + 1)};
     return circle_chance_of_zero(&input_line) < estimate_chance_of_dead_line;
 }

@@ -11,11 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static double power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
-
 /// Lines are worked on in blocks whose values of all periods stay in the second cache while they are passed over twice.
 enum { block_lines = 512, block_values = 16384, fewest_block_lines = 16 };
 
@@ -64,7 +59,7 @@ CLONED_FOR_AVX2 static void sum_scatter(const struct periodic *recording, size_t
             /* Part by part: a product of complex numbers would look for infinities each time. */
             double real = creal(output) - creal(response) * creal(input) + cimag(response) * cimag(input);
             double imaginary = cimag(output) - creal(response) * cimag(input) - cimag(response) * creal(input);
-            io_block->input_scatter[b] += power(input);
+            io_block->input_scatter[b] += cmplx_power(input);
             io_block->residual[b] += real * real + imaginary * imaginary;
         }
     }
@@ -104,7 +99,7 @@ static double certain_power_of_few(const struct block *block, size_t lines, doub
 static bool has_power_of_few(const struct block *block, size_t lines, size_t b, double count, double certain_power)
 {
     double dof;
-    const double power_of_mean = count * power(block->input[b]);
+    const double power_of_mean = count * cmplx_power(block->input[b]);
     if (power_of_mean > certain_power) {
         return true;
     }
@@ -125,13 +120,13 @@ static void estimate_block(const struct periodic *recording, size_t first, size_
         /* Part by part: a quotient of complex numbers would look for infinities each time. */
         const double complex u = io_block->input[b];
         const double complex y = io_block->output[b];
-        responses[b] = CMPLX((creal(y) * creal(u) + cimag(y) * cimag(u)) / power(u),
-                             (cimag(y) * creal(u) - creal(y) * cimag(u)) / power(u));
+        responses[b] = CMPLX((creal(y) * creal(u) + cimag(y) * cimag(u)) / cmplx_power(u),
+                             (cimag(y) * creal(u) - creal(y) * cimag(u)) / cmplx_power(u));
     }
     sum_scatter(recording, first, lines, responses, io_block);
     certain_power = few ? certain_power_of_few(io_block, lines, count) : 0.0;
     for (size_t b = 0; b < lines; b++) {
-        double input_power = power(io_block->input[b]);
+        double input_power = cmplx_power(io_block->input[b]);
         if (few ? has_power_of_few(io_block, lines, b, count, certain_power)
                 : count * input_power > certain_ratio * io_block->input_scatter[b] / (count - 1.0)) {
             double variance = io_block->residual[b] / (count * (count - 1.0) * input_power);

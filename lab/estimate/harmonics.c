@@ -3,6 +3,7 @@
 
 #include "lab/estimate/circle.h"
 #include "lab/estimate/spectra.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include <complex.h>
@@ -15,11 +16,6 @@ static const double false_alarms = 0.05;
 /// Rounding leaves about this share of the line's power in every bin, the same in every period.
 static const double rounding_power = 1e-28;
 
-static double power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
-
 /// spectra: periods x count, the line itself first, then its harmonics.
 static double distortion_db(const double complex *spectra, size_t periods, size_t count)
 {
@@ -29,15 +25,15 @@ static double distortion_db(const double complex *spectra, size_t periods, size_
     double noise = 0.0;
     for (size_t h = 1; h < count; h++) {
         const struct circle harmonic = circle_of_column(spectra, periods, count, h);
-        strength += power(harmonic.mean);
-        noise += harmonic.variance / m + rounding_power * power(line.mean);
+        strength += cmplx_power(harmonic.mean);
+        noise += harmonic.variance / m + rounding_power * cmplx_power(line.mean);
     }
     const double dof = 2.0 * (double)(count - 1);
-    if (!(noise > 0.0) || !(power(line.mean) > 0.0) ||
+    if (!(noise > 0.0) || !(cmplx_power(line.mean) > 0.0) ||
         !(statistics_f_tail(strength / noise, dof, dof * (m - 1.0)) < false_alarms)) {
         return NAN;
     }
-    return 10.0 * log10((strength - noise) / (power(line.mean) - line.variance / m));
+    return 10.0 * log10((strength - noise) / (cmplx_power(line.mean) - line.variance / m));
 }
 
 static void take_out_trend(const struct periodic *recording, const uint32_t *bins, size_t count,

@@ -48,11 +48,6 @@ struct online {
     double *input_square, *error_square;
 };
 
-static double power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
-
 /// a conj(b)
 static double complex times_conjugate(double complex a, double complex b)
 {
@@ -121,8 +116,8 @@ static void set_response(struct online *self)
             input += leading->input_spectra[m * lines + b];
             output += leading->output_spectra[m * lines + b];
         }
-        const double complex response = power(input) > 0.0 ? output / input : 0.0;
-        self->response[b] = isfinite(power(response)) ? response : 0.0;
+        const double complex response = cmplx_power(input) > 0.0 ? output / input : 0.0;
+        self->response[b] = isfinite(cmplx_power(response)) ? response : 0.0;
     }
 }
 
@@ -181,8 +176,8 @@ static void add_line(struct online *self, size_t b, double complex input, double
     input -= self->mean_input[b];
     self->mean_input[b] += input * weight;
     self->mean_error[b] += error * weight;
-    self->input_square[b] += rest * power(input);
-    self->error_square[b] += rest * power(error);
+    self->input_square[b] += rest * cmplx_power(input);
+    self->error_square[b] += rest * cmplx_power(error);
     self->product[b] += rest * times_conjugate(error, input);
 }
 
@@ -327,7 +322,7 @@ static void reference_of(const struct online *self, bool of_output, double compl
         const double complex response = self->response[b];
         if (of_output) {
             out_mean[b] = self->mean_error[b] + times(response, self->mean_input[b]);
-            out_scatter[b] = fmax(0.0, self->error_square[b] + power(response) * self->input_square[b] +
+            out_scatter[b] = fmax(0.0, self->error_square[b] + cmplx_power(response) * self->input_square[b] +
                                            2.0 * creal(times_conjugate(self->product[b], response)));
         } else {
             out_mean[b] = self->mean_input[b];
@@ -475,13 +470,13 @@ static void set_line(const struct online *self, const struct online_result *resu
     if (result->trend_per_sample != 0.0) {
         error -= result->trend_per_sample * ramp_at(self->leading, b);
     }
-    if (!(count * power(input) > certain_ratio * self->input_square[b] / (count - 1.0))) {
+    if (!(count * cmplx_power(input) > certain_ratio * self->input_square[b] / (count - 1.0))) {
         return;
     }
     const double complex difference = error / input;
-    const double residual = self->error_square[b] + power(difference) * self->input_square[b] -
+    const double residual = self->error_square[b] + cmplx_power(difference) * self->input_square[b] -
                             2.0 * creal(times_conjugate(self->product[b], difference));
-    const double variance = fmax(0.0, residual) / (count * (count - 1.0) * power(input));
+    const double variance = fmax(0.0, residual) / (count * (count - 1.0) * cmplx_power(input));
     estimate_set_line(io_frf, b, self->response[b] + difference, sqrt(variance));
 }
 

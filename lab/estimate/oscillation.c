@@ -3,6 +3,7 @@
 
 #include "lab/estimate/spectra.h"
 #include "lab/estimate/stretch.h"
+#include "lab/numeric/cmplx.h"
 
 #include <complex.h>
 #include <math.h>
@@ -64,11 +65,6 @@ static void take_rest(const double *signal, size_t periods, size_t length, const
     }
 }
 
-static double power_of(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
-
 /// Centre of the peak in bins: the mean of the bins around it, weighed by their powers.
 static void judge(const double complex *spectrum, size_t rows, double rate_hz, double repeating,
                   struct oscillation *out)
@@ -77,18 +73,18 @@ static void judge(const double complex *spectrum, size_t rows, double rate_hz, d
     double total = 0.0;
     size_t peak = fewest_cycles;
     for (size_t k = fewest_cycles; k < bins; k++) {
-        total += power_of(spectrum[k]);
-        peak = power_of(spectrum[k]) > power_of(spectrum[peak]) ? k : peak;
+        total += cmplx_power(spectrum[k]);
+        peak = cmplx_power(spectrum[k]) > cmplx_power(spectrum[peak]) ? k : peak;
     }
     /* The skirt of a drift or a decay rises towards the bins that are not looked at. */
-    if (power_of(spectrum[peak]) < power_of(spectrum[peak - 1])) {
+    if (cmplx_power(spectrum[peak]) < cmplx_power(spectrum[peak - 1])) {
         return;
     }
     double own = 0.0;
     double centre = 0.0;
     for (size_t k = peak - peak_reach; k <= peak + peak_reach && k < bins; k++) {
-        own += power_of(spectrum[k]);
-        centre += (double)k * power_of(spectrum[k]);
+        own += cmplx_power(spectrum[k]);
+        centre += (double)k * cmplx_power(spectrum[k]);
     }
     if (!(total > 0.0 && own > 0.0 && repeating > 0.0)) {
         return;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/parametric_problem.h"
 
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/polynomial.h"
 
 #include <math.h>
@@ -60,11 +61,6 @@ static double complex variable_at(const struct parametric_structure *structure, 
     return cexp(-I * (omega_rad_per_s / sample_rate_hz));
 }
 
-static double square(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
-
 static double complex power(double complex x, size_t exponent)
 {
     double complex result = 1.0;
@@ -105,7 +101,7 @@ void parametric_line_response(const struct parametric_structure *structure, cons
         io_line->delay = delay_factor(io_line->omega_rad_per_s, i[layout.transients]);
     }
     double complex denominator = polynomial_from(theta, layout.denominators, structure->denominator_lowest, x);
-    io_line->inverse = conj(denominator) / square(denominator);
+    io_line->inverse = conj(denominator) / cmplx_power(denominator);
     io_line->response =
         io_line->delay * polynomial_from(b, layout.numerators, structure->numerator_lowest, x) * io_line->inverse;
     io_line->transient = polynomial_from(i, layout.transients, 0, x) * io_line->inverse;
@@ -167,7 +163,7 @@ double parametric_error_variance(const struct parametric_data *data, size_t k, d
     if (data->unit_weights) {
         return 1.0;
     }
-    double apart = data->output_variance[k] + square(response) * parametric_input_variance(data, k);
+    double apart = data->output_variance[k] + cmplx_power(response) * parametric_input_variance(data, k);
     return fmax(apart - 2.0 * real_product(response, parametric_covariance(data, k)), cancelled * apart);
 }
 
@@ -224,7 +220,7 @@ double parametric_problem_evaluate(const void *problem, const double *theta, str
     for (size_t k = 0; k < self->data->count; k++) {
         struct parametric_line line;
         parametric_problem_line(self, theta, k, &line);
-        cost += square(line.error) / line.variance;
+        cost += cmplx_power(line.error) / line.variance;
         if (io_rows) {
             add_jacobian(self, &line, k, io_rows);
         }
@@ -275,7 +271,7 @@ static int check_variances(const struct parametric_data *data, size_t k, struct 
     if (!(input >= 0.0 && input < INFINITY)) {
         return refuse(data, out_error, k, "the input's variance", input, "a finite number, not negative");
     }
-    if (!(square(covariance) <= rounding * input * output)) {
+    if (!(cmplx_power(covariance) <= rounding * input * output)) {
         return refuse(data, out_error, k, "|covariance| of output and input", cabs(covariance),
                       "at most the root of the product of their variances");
     }

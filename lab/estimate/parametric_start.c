@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/estimate/parametric_problem.h"
 
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/scaled_svd.h"
 
 #include <lapacke.h>
@@ -28,11 +29,6 @@ struct start {
     double *vector; ///< n, in the order of the columns
 };
 
-static double power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
-
 /// First weights: the variance at the measured response, and A = 1.
 static void weigh_by_data(struct start *self)
 {
@@ -52,7 +48,7 @@ static double weigh_by_model(struct start *self, const double *theta)
     for (size_t k = 0; k < self->problem->data->count; k++) {
         struct parametric_line line;
         parametric_problem_line(self->problem, theta, k, &line);
-        cost += power(line.error) / line.variance;
+        cost += cmplx_power(line.error) / line.variance;
         double weight = cabs(line.inverse) / sqrt(line.variance);
         self->weight[k] = isfinite(weight) ? weight : 0.0;
     }
@@ -105,7 +101,7 @@ static void add_noise(struct start *self, size_t k)
     double input_variance = parametric_input_variance(data, k);
     double complex shared = input_variance > 0.0 ? parametric_covariance(data, k) / sqrt(input_variance) : 0.0;
     double output_variance = data->unit_weights ? 1.0 : data->output_variance[k];
-    double alone = sqrt(fmax(output_variance - power(shared), 0.0)) * self->weight[k];
+    double alone = sqrt(fmax(output_variance - cmplx_power(shared), 0.0)) * self->weight[k];
     double complex along = -self->delay[k] * sqrt(input_variance) * self->weight[k];
     add_products(self, problem->x[k], 0.0, alone);
     if (input_variance > 0.0) {

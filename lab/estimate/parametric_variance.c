@@ -2,6 +2,7 @@
 #include "lab/estimate/parametric_variance.h"
 
 #include "lab/estimate/parametric_problem.h"
+#include "lab/numeric/cmplx.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -216,11 +217,6 @@ size_t parametric_weights_pool(const struct parametric_weights *self, struct par
     return pooled;
 }
 
-static double square(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
-
 bool parametric_weights_add_distortion(const struct parametric_weights *self, const struct parametric_model *model,
                                        struct parametric_data *io_data)
 {
@@ -234,7 +230,7 @@ bool parametric_weights_add_distortion(const struct parametric_weights *self, co
         parametric_residual(model, io_data, residual);
         for (size_t k = 0; k < count; k++) {
             double complex response = parametric_response(model, io_data->frequency_hz[k], NULL);
-            excess[k] = (freedom * square(residual[k]) - 1.0) * parametric_error_variance(io_data, k, response);
+            excess[k] = (freedom * cmplx_power(residual[k]) - 1.0) * parametric_error_variance(io_data, k, response);
         }
         ready = average(excess, count, window);
     }

@@ -6,6 +6,7 @@
 #include "lab/estimate/period_search.h"
 #include "lab/estimate/ramp.h"
 #include "lab/estimate/spectra.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/large.h"
 #include "lab/numeric/vector.h"
 
@@ -290,11 +291,6 @@ static int take_out_trend(struct periodic *self, struct error *out_error)
     return 0;
 }
 
-static double power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
-
 static double larger(double a, double b)
 {
     return a > b ? a : b;
@@ -316,7 +312,7 @@ static void mean_input(const struct periodic *self, const double complex *sums, 
     }
     for (size_t b = 0; b < self->bin_count; b++) {
         out_mean[b] /= (double)self->used;
-        largest_power = larger(largest_power, power(out_mean[b]));
+        largest_power = larger(largest_power, cmplx_power(out_mean[b]));
     }
     largest = fmax(largest, sqrt(largest_power));
     const double length = (double)self->period_samples;
@@ -325,12 +321,12 @@ static void mean_input(const struct periodic *self, const double complex *sums, 
         const double most = fabs(slope) * length * length / (4.0 * (double)self->bins[b]);
         const double clear = 4.0 * most + rounding * largest;
         out_limit[b] = rounding * largest;
-        if (power(out_mean[b]) > clear * clear) {
+        if (cmplx_power(out_mean[b]) > clear * clear) {
             continue;
         }
         const double complex ramp = slope * ramp_transform(self->bins[b], self->period_samples);
         out_mean[b] -= ramp;
-        out_limit[b] = larger(rounding * largest, rounding_of_ramp * sqrt(power(ramp)));
+        out_limit[b] = larger(rounding * largest, rounding_of_ramp * sqrt(cmplx_power(ramp)));
     }
 }
 
@@ -342,7 +338,7 @@ static size_t silence_lines(struct periodic *self, const double complex *mean, c
     double strongest = 0.0;
     *out_strongest = 0;
     for (size_t b = 0; b < self->bin_count; b++) {
-        const double magnitude = sqrt(power(mean[b]));
+        const double magnitude = sqrt(cmplx_power(mean[b]));
         *out_strongest = magnitude > strongest ? b : *out_strongest;
         strongest = larger(strongest, magnitude);
         powered += magnitude > limit[b];

@@ -2,11 +2,7 @@
 #include "lab/estimate/ratio.h"
 
 #include "lab/estimate/circle.h"
-
-static double power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
+#include "lab/numeric/cmplx.h"
 
 /// Sums over the rows of one line.
 struct sums {
@@ -27,10 +23,10 @@ static struct sums sum_rows(const struct ratio_spectra *spectra, size_t line)
         double complex crossed = spectra->input[i] * mirrored;
         sums.output_instrument += spectra->output[i] * mirrored;
         sums.input_instrument += crossed;
-        sums.output += power(spectra->output[i]);
-        sums.input += power(spectra->input[i]);
-        sums.instrument += power(spectra->instrument[i]);
-        sums.crossed += power(crossed);
+        sums.output += cmplx_power(spectra->output[i]);
+        sums.input += cmplx_power(spectra->input[i]);
+        sums.instrument += cmplx_power(spectra->instrument[i]);
+        sums.crossed += cmplx_power(crossed);
     }
     return sums;
 }
@@ -39,7 +35,7 @@ static double chance_of_no_power(const struct ratio_spectra *spectra, const stru
 {
     double rows = (double)spectra->rows;
     struct circle crossed = {.count = (size_t)spectra->independent, .mean = sums->input_instrument / rows};
-    crossed.variance = sums->crossed / rows - power(crossed.mean);
+    crossed.variance = sums->crossed / rows - cmplx_power(crossed.mean);
     crossed.variance = crossed.variance > 0.0 ? crossed.variance * rows / (rows - 1.0) : 0.0;
     return circle_chance_of_zero(&crossed);
 }
@@ -48,17 +44,17 @@ struct ratio ratio_of_line(const struct ratio_spectra *spectra, size_t line)
 {
     double rows = (double)spectra->rows;
     struct sums sums = sum_rows(spectra, line);
-    double denominator = power(sums.input_instrument);
+    double denominator = cmplx_power(sums.input_instrument);
     struct ratio self = {.response = sums.output_instrument / sums.input_instrument, .input_power = sums.input / rows};
     double residual = 0.0;
     for (size_t m = 0; m < spectra->rows; m++) {
         size_t i = m * spectra->stride + line;
-        residual += power(spectra->output[i] - self.response * spectra->input[i]);
+        residual += cmplx_power(spectra->output[i] - self.response * spectra->input[i]);
     }
     double scatter = residual / (rows * (1.0 - 1.0 / spectra->independent));
     self.variance = rows / spectra->independent * scatter * sums.instrument / denominator;
     self.coherence = sums.output > 0.0 && sums.instrument > 0.0
-                         ? power(sums.output_instrument) / (sums.output * sums.instrument)
+                         ? cmplx_power(sums.output_instrument) / (sums.output * sums.instrument)
                          : 0.0;
     self.chance_of_no_power = chance_of_no_power(spectra, &sums);
     return self;

@@ -2,6 +2,7 @@
 #include "lab/estimate/repetition.h"
 
 #include "lab/estimate/stretch.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include <complex.h>
@@ -73,7 +74,7 @@ static struct rows split_rows(const double complex *spectra, size_t stride, size
         mean += spectra[p * stride] / (double)periods;
     }
     for (size_t p = 0; p < periods; p++) {
-        total += stretch_power(spectra[p * stride] - mean) / (double)periods;
+        total += cmplx_power(spectra[p * stride] - mean) / (double)periods;
     }
     double taken = 0.0;
     for (unsigned j = 1; j < multiple; j++) {
@@ -82,13 +83,13 @@ static struct rows split_rows(const double complex *spectra, size_t stride, size
             const double complex turn = cexp(-I * two_pi * (double)(j * p % multiple) / multiple);
             row += (spectra[p * stride] - mean) * turn / (double)periods;
         }
-        taken += stretch_power(row);
+        taken += cmplx_power(row);
         if (prime_to(j, multiple)) {
-            self.wanted += stretch_power(row);
+            self.wanted += cmplx_power(row);
             self.wanted_count++;
         }
     }
-    const double rounding = rounding_power * stretch_power(mean) + cancellation * total;
+    const double rounding = rounding_power * cmplx_power(mean) + cancellation * total;
     self.others = fmax(total - taken, 0.0) + rounding * (double)self.others_count;
     return self;
 }

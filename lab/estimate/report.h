@@ -44,7 +44,7 @@ double frf_report_known_delay_s(const struct frf *frf);
 /// Adds a section: magnitude in dB with its 95 % regions, phase, standard deviations (total, and noise where it
 /// differs), coherence where a method gives it, and how far each line is from what it should be, over 2 std: from the
 /// models, else from its neighbours (lab/estimate/smoothness.h). A perfect model stays below 1.
-/// Measured lines are points that nothing joins. Runs and other responses are overlaid, each in a shape of its own, with
+/// Measured lines are points that nothing joins. Runs and other responses are overlaid, each in its own shape, with
 /// a panel of how far they are from the first, over 2 std of the difference. A response that is itself a model's
 /// (method `parametric`) is drawn as a line and called one.
 /// `options` may be NULL. Lines that are not valid are left out and counted.

@@ -2,6 +2,7 @@
 #include "lab/estimate/settle.h"
 
 #include "lab/numeric/clones.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 
 #include <math.h>
@@ -19,11 +20,6 @@ static const double largest_factor = 1e90;
 static const double largest_step = 1e200;
 /// A transient is measured where its power is this many times the scatter's.
 static const double measurable = 4.0;
-
-static double power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
 
 /// Lines are judged in blocks whose values of all periods stay in the second cache while they are passed over.
 enum { block_lines = 512, block_values = 16384, fewest_block_lines = 16 };
@@ -57,14 +53,14 @@ struct comparison {
 /// What a line's settled periods are expected to deviate by, from the sum of their squares.
 static double expected_deviation(double scatter, double complex mean, double count)
 {
-    return (scatter / (count - 1.0) + rounding_power * power(mean)) * (1.0 + 1.0 / count);
+    return (scatter / (count - 1.0) + rounding_power * cmplx_power(mean)) * (1.0 + 1.0 / count);
 }
 
 static void subtract_mean(const double complex *spectra, const double complex *mean, size_t lines,
                           double *restrict out_deviations)
 {
     for (size_t b = 0; b < lines; b++) {
-        out_deviations[b] = power(spectra[b] - mean[b]);
+        out_deviations[b] = cmplx_power(spectra[b] - mean[b]);
     }
 }
 
@@ -94,7 +90,7 @@ CLONED_FOR_AVX2 static void make_reference(const double complex *spectra, size_t
         double dof = (double)(io_totals->count - 1);
         double expected = expected_deviation(io_self->scale[b], io_self->mean[b], (double)io_totals->count);
         io_self->scale[b] = expected > 0.0 ? 1.0 / (expected * dof) : 0.0;
-        io_totals->signal += power(io_self->mean[b]);
+        io_totals->signal += cmplx_power(io_self->mean[b]);
         io_totals->scatter += expected;
     }
 }
@@ -226,14 +222,14 @@ bool settle_differs(const double complex *period, const struct settle_reference 
     double product = 1.0;
     for (size_t b = 0; b < reference->bin_count; b++) {
         const double expected = expected_deviation(reference->scatter[b], reference->mean[b], count);
-        const double deviation = power(period[b] - reference->mean[b]);
+        const double deviation = cmplx_power(period[b] - reference->mean[b]);
         product *= chance_factor(deviation, expected > 0.0 ? 1.0 / (expected * (count - 1.0)) : 0.0);
         if (product > largest_product) {
             compared.log_chance -= (count - 1.0) * log(product);
             product = 1.0;
         }
         compared.deviation += deviation;
-        signal += power(reference->mean[b]);
+        signal += cmplx_power(reference->mean[b]);
         scatter += expected;
     }
     compared.log_chance -= (count - 1.0) * log(product);

@@ -32,10 +32,4 @@ bool stretch_transform(const struct periodic *recording, const struct stretch *s
 bool stretch_transform_near(const struct periodic *recording, const struct stretch *self, size_t reach,
                             double complex *out_input, double complex *out_output);
 
-/// |z|^2
-static inline double stretch_power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
-
 #endif

@@ -69,7 +69,7 @@ static bool residuals_of(const struct periodic *recording, const struct stretch_
     }
     for (size_t m = 0; m < span->periods; m++) {
         out[m] -= mean;
-        power += stretch_power(out[m]) / (double)span->periods;
+        power += cmplx_power(out[m]) / (double)span->periods;
     }
     for (size_t m = 0; m < span->periods && power > 0.0; m++) {
         out[m] /= sqrt(power);

@@ -22,7 +22,7 @@ void figure_set_categories(struct figure *self, size_t count, const char *const 
 {
     self->categories = count < figure_categories_max ? count : figure_categories_max;
     for (size_t n = 0; n < self->categories; n++) {
-        text_copy(names[n], sizeof self->category[n], self->category[n]);
+        text_shorten(names[n], sizeof self->category[n], self->category[n]);
     }
 }
 
@@ -31,7 +31,7 @@ struct figure_panel *figure_add_panel(struct figure *self, const char *label, en
     assert(self->count < figure_panels_max);
     struct figure_panel *panel = &self->panel[self->count];
     self->count++;
-    text_copy(label, sizeof panel->label, panel->label);
+    text_shorten(label, sizeof panel->label, panel->label);
     panel->scale = scale;
     panel->height = usual_height_px;
     panel->low = NAN;
@@ -47,7 +47,7 @@ static struct figure_series *add_series(struct figure_panel *self, enum figure_k
                                                figure_purple, figure_orange,    figure_sky};
     size_t coloured = self->count - plot_count_kind(self, figure_limit, figure_limit);
     struct figure_series series = {.kind = kind, .count = y != NULL ? count : 0, .x = x, .y = y};
-    text_copy(name, sizeof series.name, series.name);
+    text_shorten(name, sizeof series.name, series.name);
     series.colour = cycle[coloured % (sizeof cycle / sizeof cycle[0])];
     series.marker = (enum figure_marker)(plot_count_kind(self, figure_points, figure_points) % (figure_diamond + 1));
     series.dash = (enum figure_dash)(plot_count_kind(self, figure_line, figure_step) % 4);

@@ -307,7 +307,14 @@ static void collect_items(struct layout *self, size_t p)
 
 static void wrap_item(struct layout_item *item, double width)
 {
-    item->lines = text_wrap(item->text, width / layout_font_px, layout_legend_lines_max, item->line, NULL);
+    int cut = 0;
+    item->lines = text_wrap(item->text, width / layout_font_px, layout_legend_lines_max, item->line, &cut);
+    for (size_t size = strlen(item->text); cut && size > 16; size -= 4) {
+        char whole[sizeof item->text];
+        text_copy(item->text, sizeof whole, whole);
+        text_shorten(whole, size, item->text);
+        item->lines = text_wrap(item->text, width / layout_font_px, layout_legend_lines_max, item->line, &cut);
+    }
 }
 
 /* Places a panel's items beside its frame; false if they are taller than the frame. */

@@ -49,7 +49,7 @@ static const char style[] =
     ".row{display:flex;flex-wrap:wrap;gap:0 24px;align-items:flex-start}.row>*{flex:0 1 398px;min-width:0}\n"
     "footer{margin-top:44px;padding-top:10px;border-top:1px solid var(--grid);font-size:12px;color:var(--dim);"
     "overflow-wrap:anywhere}\n"
-    "@media screen and (max-width:700px){figure>.fig{max-width:none}}\n"
+    "@media screen and (max-width:700px){figure>.fig{max-width:none}th,td{overflow-wrap:break-word}}\n"
     "@page{size:A4;margin:15mm 15mm 17mm}\n"
     "@media print{body{padding:0;max-width:none;font-size:10.5pt}h1{font-size:18pt}h2{font-size:13pt}"
     "h2,h3{break-after:avoid}figure,tr,li,dl{break-inside:avoid}p{orphans:3;widows:3}figure,.tb{overflow:visible}"

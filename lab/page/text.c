@@ -178,3 +178,24 @@ void text_copy(const char *text, size_t size, char *out)
     }
     out[used] = '\0';
 }
+
+void text_shorten(const char *text, size_t size, char *out)
+{
+    static const char dots[] = "\xE2\x80\xA6";
+    const size_t length = text != NULL ? strlen(text) : 0;
+    if (length < size || size < 2 * sizeof dots) {
+        text_copy(text, size, out);
+        return;
+    }
+    /* More of the beginning than of the end; no character is cut in two. */
+    const size_t room = size - sizeof dots;
+    size_t end = length - room / 3;
+    while (end < length && is_continuation((unsigned char)text[end])) {
+        end++;
+    }
+    text_copy(text, room - room / 3 + 1, out);
+    size_t used = strlen(out);
+    memcpy(out + used, dots, sizeof dots - 1);
+    used += sizeof dots - 1;
+    memcpy(out + used, text + end, length - end + 1);
+}

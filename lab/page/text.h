@@ -35,4 +35,7 @@ size_t text_wrap(const char *text, double width_em, size_t max, struct text_span
 /// Range:     size >= 1; NULL copies as ""
 void text_copy(const char *text, size_t size, char *out);
 
+/// Copies a text of any length; one that is too long keeps its beginning and its end, with three dots in between.
+void text_shorten(const char *text, size_t size, char *out);
+
 #endif

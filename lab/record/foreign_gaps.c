@@ -5,6 +5,7 @@
 #include "lab/record/record_table.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -34,8 +35,8 @@ static int cut_end(struct text_table *io_table, const bool *used, struct format_
         return error_set(out_error, error_refused, "%s: no row has a value in every column that is used",
                          io_table->path);
     if (rows < io_table->rows)
-        format_notes_add(io_notes, format_lost, "the last %zu row%s, from line %zu: %s has no value in them",
-                         io_table->rows - rows, io_table->rows - rows == 1 ? "" : "s", io_table->row_line[rows],
+        format_notes_add(io_notes, format_lost, "the last %zu row%s, from row %zu on: %s has no value in them",
+                         io_table->rows - rows, io_table->rows - rows == 1 ? "" : "s", rows + 1,
                          first_missing(io_table, used, rows));
     io_table->rows = rows;
     return 0;
@@ -78,6 +79,19 @@ static size_t count_lost(const struct text_table *table, const bool *used, size_
     return count;
 }
 
+/// The rows of a Scope's channels stand in different lines: their number and time say where.
+static void note_lost(const struct text_table *table, const bool *used, size_t count, size_t first,
+                      struct format_notes *io_notes)
+{
+    char when[40] = "";
+    for (size_t c = 0; c < table->column_count; c++)
+        if (strcmp(table->columns[c].name, "time_s") == 0 && !isnan(table->columns[c].data[first]))
+            snprintf(when, sizeof when, " at %.9g s", table->columns[c].data[first]);
+    format_notes_add(io_notes, format_kept,
+                     "%zu row%s with an empty cell, the first is row %zu%s (%s): marked as lost with valid 0", count,
+                     count == 1 ? "" : "s", first + 1, when, first_missing(table, used, first));
+}
+
 int foreign_mark_gaps(struct text_table *io_table, const bool *used, const char *valid_name,
                       struct format_notes *io_notes, struct error *out_error)
 {
@@ -87,9 +101,7 @@ int foreign_mark_gaps(struct text_table *io_table, const bool *used, const char 
     const size_t marked = status ? 0 : count_lost(io_table, used, &first);
     if (marked == 0)
         return status;
-    format_notes_add(io_notes, format_kept,
-                     "%zu row%s with an empty cell, the first in line %zu (%s): marked as lost with valid 0", marked,
-                     marked == 1 ? "" : "s", io_table->row_line[first], first_missing(io_table, used, first));
+    note_lost(io_table, used, marked, first, io_notes);
     bool *lost = malloc(io_table->rows * sizeof *lost);
     if (!lost)
         return error_set(out_error, error_refused, "%s: memory is short", io_table->path);

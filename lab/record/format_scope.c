@@ -213,12 +213,17 @@ static struct run_of_values find_values(const struct scope *self, const struct c
     return found;
 }
 
-static double start_of(const struct scope *self, double step_ms, const double *values)
+/// Where the common times begin: when all channels have begun, at a time of one that has no more values than wanted.
+static double start_of(const struct scope *self, double step_ms, const double *values, size_t width)
 {
     double start = -INFINITY;
     for (size_t i = 0; i < self->count; i++)
         if (stride_of(&self->channels[i], step_ms) && values[self->channels[i].time] > start)
             start = values[self->channels[i].time];
+    for (size_t i = 0; i < self->count; i++)
+        for (size_t row = 0; stride_of(&self->channels[i], step_ms) == 1 && row < self->end - self->first; row++)
+            if (values[row * width + self->channels[i].time] >= start)
+                return values[row * width + self->channels[i].time];
     return start;
 }
 
@@ -287,7 +292,7 @@ static int make_table(struct scope *self, double step_ms, const double *values, 
                       struct format_notes *io_notes, struct error *out_error)
 {
     struct run_of_values *at = calloc(self->count, sizeof *at);
-    const double start = start_of(self, step_ms, values);
+    const double start = start_of(self, step_ms, values, width);
     size_t rows = SIZE_MAX;
     int status = at ? 0 : error_set(out_error, error_refused, "%s: memory is short", self->text.path);
     for (size_t i = 0; i < self->count && !status; i++) {

@@ -10,6 +10,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum {
     column_frequency,
@@ -280,7 +281,10 @@ bool frf_file_is(const char *path)
 {
     struct error ignored;
     struct line line = {0};
-    struct line_reader *reader = line_reader_open(path, &ignored);
+    struct stat file;
+    // Of a pipe the first line could be read only once.
+    const bool again = stat(path, &file) == 0 && S_ISREG(file.st_mode);
+    struct line_reader *reader = again ? line_reader_open(path, &ignored) : NULL;
     const char *first = column_names[column_frequency];
     const size_t length = strlen(first);
     bool found = reader != NULL;

@@ -1,13 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/record/run_stream.h"
 
+#include "lab/record/format.h"
 #include "lab/record/run_checks.h"
 #include "lab/record/run_guess.h"
 #include "lab/record/run_names.h"
 #include "lab/record/text_stream.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 /* Rows are checked in pieces that the cache still holds. */
 enum { piece_rows = 65536 };
@@ -77,6 +80,24 @@ static int open_all(struct run_stream *self, const char *path, struct error *out
     return status;
 }
 
+/* A table of another program that is refused here may be one that convert reads: whoever is refused is told. */
+static int say_convert(const char *path, int status, struct error *io_error)
+{
+    struct error ignored;
+    const struct record_format *format;
+    struct stat file;
+    const bool told =
+        !io_error || strstr(io_error->message, "servoscope convert") || strstr(io_error->message, "--map");
+    if (status != error_refused || told || stat(path, &file) != 0 || !S_ISREG(file.st_mode) ||
+        format_by_content(path, &format, &ignored) != 0)
+        return status;
+    const size_t length = strlen(io_error->message);
+    if (strcmp(format->name, "text") == 0 || strcmp(format->name, "twincat") == 0)
+        snprintf(io_error->message + length, sizeof io_error->message - length,
+                 "; 'servoscope convert' makes a run of other programs' tables");
+    return status;
+}
+
 int run_stream_open(const char *path, const struct run_options *options, struct run_stream **out_self,
                     struct error *out_error)
 {
@@ -91,7 +112,7 @@ int run_stream_open(const char *path, const struct run_options *options, struct 
         run_stream_close(self);
     else
         *out_self = self;
-    return status;
+    return say_convert(path, status, out_error);
 }
 
 int run_stream_fill(struct run_stream *self, size_t rows, struct error *out_error)
@@ -108,7 +129,7 @@ int run_stream_fill(struct run_stream *self, size_t rows, struct error *out_erro
             status = run_checks_rows(&self->checks, &self->text.table, &self->run, first, out_error);
     }
     view(self);
-    return status;
+    return say_convert(self->text.table.path, status, out_error);
 }
 
 const struct run *run_stream_run(const struct run_stream *self)
@@ -125,7 +146,6 @@ size_t run_stream_rows(const struct run_stream *self)
 {
     return self->text.row_total;
 }
-
 double run_stream_share(const struct run_stream *self)
 {
     return text_stream_share(&self->text);
@@ -203,7 +223,7 @@ int run_stream_finish(struct run_stream *self, struct error *out_error)
     self->run.sample_rate_hz = self->key_rate_hz;
     if (!status)
         status = run_checks_end(&self->checks, &self->text.table, &self->run, &self->options, out_error);
-    return status;
+    return say_convert(self->text.table.path, status, out_error);
 }
 
 int run_stream_take(struct run_stream *self, struct run *out_run, struct error *out_error)

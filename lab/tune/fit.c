@@ -78,7 +78,7 @@ static double complex loop_at(const struct tune_problem *self, const double comp
     return sum * response[k];
 }
 
-/// A loop's distance from -1 is far from the ends of what a double holds, which the division of complex.h looks out for.
+/// A loop's distance from -1 is far from the ends of what a double holds, which complex.h's division looks out for.
 static double complex reciprocal(double complex z)
 {
     const double square = creal(z) * creal(z) + cimag(z) * cimag(z);

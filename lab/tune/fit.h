@@ -51,8 +51,8 @@ double tune_fit_cost(const struct tune_problem *self, const double complex *resp
 /// Test:   tests/unit/test_tune_fit.c, tests/golden/test_tune_reference.c
 bool tune_fit_linear(const struct tune_problem *self, const double complex *response, double *out_gain);
 
-/// Starts from io_gain and minimises sum weight^2 |(M - (1 - M) L)/(1 + L_before)|^2, tune_iterations times over or until no gain moves. A
-/// fixed point need not be a minimum of J_mr.
+/// Starts from io_gain and minimises sum weight^2 |(M - (1 - M) L)/(1 + L_before)|^2, tune_iterations times over or
+/// until no gain moves. A fixed point need not be a minimum of J_mr.
 bool tune_fit_reweighted(const struct tune_problem *self, const double complex *response, double *io_gain);
 
 #endif

@@ -30,29 +30,31 @@ static inline uint32_t sixteenth(uint32_t value)
     return value >> 4 | (value >> 31) * 0xF0000000u;
 }
 
-static void sum_row(uint32_t *io_real, uint32_t *io_imaginary, const int32_t *factors, const int32_t *data,
-                    uint32_t groups)
+/* The two sums of a row. */
+struct sums {
+    uint32_t real, imaginary;
+};
+
+static inline struct sums sum_row(struct sums sums, const int32_t *factors, const int32_t *data, uint32_t groups)
 {
-    uint32_t real = *io_real, imaginary = *io_imaginary;
     for (uint32_t g = 0; g < groups; ++g) {
-        real = add_product(real, data[4u * g], factors[8u * g]);
-        imaginary = add_product(imaginary, data[4u * g + 1u], factors[8u * g + 1u]);
-        real = add_product(real, data[4u * g + 2u], factors[8u * g + 2u]);
-        imaginary = add_product(imaginary, data[4u * g + 3u], factors[8u * g + 3u]);
+        sums.real = add_product(sums.real, data[4u * g], factors[8u * g]);
+        sums.imaginary = add_product(sums.imaginary, data[4u * g + 1u], factors[8u * g + 1u]);
+        sums.real = add_product(sums.real, data[4u * g + 2u], factors[8u * g + 2u]);
+        sums.imaginary = add_product(sums.imaginary, data[4u * g + 3u], factors[8u * g + 3u]);
     }
-    *io_real = real;
-    *io_imaginary = imaginary;
+    return sums;
 }
 
 static void accumulate_row(int32_t *accumulator, const int32_t *rotation, const int32_t *factors, const int32_t *data,
                            uint32_t groups)
 {
-    uint32_t real = 8u, imaginary = 8u;
-    sum_row(&real, &imaginary, factors, data, groups);
+    struct sums sums = {8u, 8u};
+    sums = sum_row(sums, factors, data, groups);
     int32_t cosine = rotation[0], sine = rotation[1];
     int32_t real_2 = as_signed(2u * (uint32_t)accumulator[0]), imaginary_2 = as_signed(2u * (uint32_t)accumulator[1]);
-    real = subtract_product(add_product(0, real_2, cosine), imaginary_2, sine) + sixteenth(real);
-    imaginary = add_product(add_product(0, real_2, sine), imaginary_2, cosine) + sixteenth(imaginary);
+    uint32_t real = subtract_product(add_product(0, real_2, cosine), imaginary_2, sine) + sixteenth(sums.real);
+    uint32_t imaginary = add_product(add_product(0, real_2, sine), imaginary_2, cosine) + sixteenth(sums.imaginary);
     accumulator[0] = as_signed(real);
     accumulator[1] = as_signed(imaginary);
 }
@@ -70,10 +72,14 @@ void frf_block_accumulate_portable(int32_t *accumulators, const int32_t *rows, c
 void frf_block_sum_portable(int32_t *sums, const int32_t *rows, const int32_t *data, uint32_t groups, bool first)
 {
     for (uint32_t row = 0; row < 2u; ++row) {
-        uint32_t real = first ? 8u : (uint32_t)sums[2u * row], imaginary = first ? 8u : (uint32_t)sums[2u * row + 1u];
-        sum_row(&real, &imaginary, rows + 4u * row, data, groups);
-        sums[2u * row] = as_signed(real);
-        sums[2u * row + 1u] = as_signed(imaginary);
+        struct sums row_sums = {8u, 8u};
+        if (!first) {
+            row_sums.real = (uint32_t)sums[2u * row];
+            row_sums.imaginary = (uint32_t)sums[2u * row + 1u];
+        }
+        row_sums = sum_row(row_sums, rows + 4u * row, data, groups);
+        sums[2u * row] = as_signed(row_sums.real);
+        sums[2u * row + 1u] = as_signed(row_sums.imaginary);
     }
 }
 

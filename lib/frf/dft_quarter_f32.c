@@ -8,7 +8,7 @@
 
 static inline void look_up(const struct frf_quarter_f32 *table, uint32_t index, float *out_cosine, float *out_sine)
 {
-    struct frf_quarter_place place = frf_quarter_place(index * table->sample_steps, table->quarter_steps);
+    struct frf_quarter_place place = frf_find_quarter(index * table->sample_steps, table->quarter_steps);
     float cosine = table->sine[place.cosine], sine = table->sine[place.sine];
     *out_cosine = place.minus_cosine ? -cosine : cosine;
     *out_sine = place.minus_sine ? -sine : sine;

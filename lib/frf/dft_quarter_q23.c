@@ -10,7 +10,7 @@
 
 static inline struct frf_point look_up(const struct frf_quarter_q23 *table, uint32_t index)
 {
-    struct frf_quarter_place place = frf_quarter_place(index * table->sample_steps, table->quarter_steps);
+    struct frf_quarter_place place = frf_find_quarter(index * table->sample_steps, table->quarter_steps);
     struct frf_point factor = {table->sine[place.cosine], table->sine[place.sine]};
     factor.cosine = place.minus_cosine ? -factor.cosine : factor.cosine;
     factor.sine = place.minus_sine ? -factor.sine : factor.sine;

@@ -18,7 +18,7 @@ struct frf_quarter_place {
 };
 
 /* With the second half folded onto the first and that about its middle; step below four quarters. */
-static inline struct frf_quarter_place frf_quarter_place(uint32_t step, uint32_t quarter_steps)
+static inline struct frf_quarter_place frf_find_quarter(uint32_t step, uint32_t quarter_steps)
 {
     struct frf_quarter_place place;
     place.minus_sine = step >= 2u * quarter_steps;

@@ -50,6 +50,9 @@ grep -q 'assumed: velocity_rad_per_s: the file gives speed no unit; its values t
 grep -q 'assumed: torque_Nm: iq \[Nm\] times 0.5 as --map says, not what its unit would give' said || fail "$(cat said)"
 "$SERVOSCOPE" convert scope.csv fast.csv --rate 2000 >said
 grep -q 'run, 3000 samples' said || fail "$(cat said)"
+"$SERVOSCOPE" convert scope.csv slow.csv --rate 200 >said # the slow channel's times are 2 ms behind the others'
+grep -q 'run, 299 samples' said || fail "$(cat said)"
+grep -v '^#' slow.csv | sed -n 2p | grep -q '^0.002,.*,1$' || fail "slow.csv: $(head -5 slow.csv)"
 refuse 1 "no channel has values at that sample time" scope.csv x.csv --rate 300
 refuse 1 "there" scope.csv x.csv --map torque_Nm=nothing
 sed '20s/;[^;]*$/;abc/' scope.csv >bad.csv
@@ -59,7 +62,7 @@ refuse 1 "bad.csv:21: time_s: 0.013 follows 0.008: 4 samples are missing" bad.cs
 awk -F';' -v OFS=';' 'NR == 500 { $5 = "" } 1' scope.csv >hole.csv
 "$SERVOSCOPE" convert hole.csv mapped.csv >said || fail "hole.csv: status $?"
 grep -q 'run, 1500 samples' said || fail "hole.csv: $(cat said)"
-grep -q 'kept: 1 row with an empty cell, the first in line 500 (angle \[deg\]): marked as lost with valid 0' said || fail "$(cat said)"
+grep -q 'kept: 1 row with an empty cell, the first is row 489 at 0.488 s (angle \[deg\]): marked as lost with valid 0' said || fail "$(cat said)"
 grep -v '^#' mapped.csv | awk -F, 'NR == 1 { for (c = 1; c <= NF; c++) valid = $c == "valid" ? c : valid }
     NR > 1 && $valid != 1 { print NR - 2; lost++ } END { exit lost != 1 }' >lost || fail "hole.csv: lost rows $(cat lost)"
 [ "$(cat lost)" = 488 ] || fail "hole.csv: row $(cat lost) is lost"

@@ -120,6 +120,12 @@ for page in pages + glob.glob(os.path.join(source, "docs", "**", "*.md"), recurs
             wrong += [f"{page}: no test is called {part}" for part in choice.split("|")
                       if not any(re.search(part, test) for test in tests)]
             checked += 1
+# What the glossary calls a name in C is one.
+sources = subprocess.run(["grep", "-rhow", "[a-z][A-Za-z0-9_]*", "--include=*.[ch]", "lib", "drivers", "sim", "lab"], cwd=source,
+                         check=True, capture_output=True, text=True).stdout
+words = set(sources.split())
+with open(os.path.join(source, "docs", "glossary.md"), encoding="utf-8") as file:
+    wrong += [f"glossary.md: {name}" for name in re.findall(r"`([a-z]\w*)`", file.read()) if name not in words]
 print("\n".join(wrong), file=sys.stderr)
 sys.exit(1 if wrong or checked < 200 else 0)
 END

@@ -36,7 +36,7 @@ for subcommand in measure simulate; do
     drive=(--drive can:none0)
     [ $subcommand = measure ] || drive=(--model model.json)
     status=0
-    (trap '' XFSZ && ulimit -f 4 && exec "$SERVOSCOPE" $subcommand "${drive[@]}" --table table.mst --periods 3 --out x.csv) 2>err || status=$?
+    (trap '' XFSZ && ulimit -f 2 && exec "$SERVOSCOPE" $subcommand "${drive[@]}" --table table.mst --periods 3 --out x.csv) 2>err || status=$?
     [ "$status" -eq 1 ] || fail "$subcommand on a full disk: status $status"
     grep -q "x.csv: cannot be written" err || fail "$subcommand on a full disk: $(cat err)"
     [ ! -e x.csv ] || fail "$subcommand left x.csv"

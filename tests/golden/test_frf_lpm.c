@@ -10,6 +10,7 @@
 #include "lab/estimate/frf_lpm.h"
 #include "lab/estimate/frf_mean.h"
 #include "lab/estimate/spectra.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/fft.h"
 #include "lab/numeric/statistics.h"
 #include "tests/support/claim.h"
@@ -22,11 +23,6 @@ static const double two_pi = 6.283185307179586476925;
 void setUp(void) {}
 
 void tearDown(void) {}
-
-static double power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
 
 static double complex truth(double bin, double length)
 {
@@ -134,7 +130,7 @@ static void test_frf_of_period_20_has_no_transient_left(void)
     for (size_t b = 0; b < recording.bin_count; b++) {
         size_t last = recording.bin_count + b;
         double complex response = recording.output_spectra[last] / recording.input_spectra[last];
-        sum += power(response - truth((double)recording.bins[b], length)) / (double)recording.bin_count;
+        sum += cmplx_power(response - truth((double)recording.bins[b], length)) / (double)recording.bin_count;
     }
     claim_within("2.9: FRF error of period 20, N = 100, RMS over lines [dB]", "about -150", 10.0 * log10(sum),
                  -INFINITY, -125.0);
@@ -176,9 +172,9 @@ static void add_run(const struct run *run, const struct estimate_options *option
     TEST_ASSERT_TRUE(spectra_transform_two(run->columns[0].data, run->columns[1].data, rows, spectra, output));
     for (size_t b = 0; b < lines; b++) {
         double complex exact = truth((double)(b + 1), length);
-        io_tally->error[rect][b] += power(rectangular.real[b] + rectangular.imag[b] * I - exact);
-        io_tally->error[lpm][b] += power(local.real[b] + local.imag[b] * I - exact);
-        io_tally->error[hann][b] += power(hann_response(spectra, output, periods * (b + 1)) - exact);
+        io_tally->error[rect][b] += cmplx_power(rectangular.real[b] + rectangular.imag[b] * I - exact);
+        io_tally->error[lpm][b] += cmplx_power(local.real[b] + local.imag[b] * I - exact);
+        io_tally->error[hann][b] += cmplx_power(hann_response(spectra, output, periods * (b + 1)) - exact);
         io_tally->predicted[b] += local.std[b] * local.std[b];
     }
     frf_free(&rectangular);

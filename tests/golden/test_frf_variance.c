@@ -8,6 +8,7 @@
 #include "lab/estimate/circle.h"
 #include "lab/estimate/frf_lpm.h"
 #include "lab/estimate/frf_mean.h"
+#include "lab/numeric/cmplx.h"
 #include "lab/numeric/statistics.h"
 #include "tests/support/claim.h"
 
@@ -22,11 +23,6 @@ void setUp(void) {}
 
 void tearDown(void) {}
 
-static double power(double complex z)
-{
-    return creal(z) * creal(z) + cimag(z) * cimag(z);
-}
-
 /// Sums over runs, line by line or all together.
 struct tally {
     double predicted;
@@ -40,7 +36,7 @@ static void add(const struct frf *frf, size_t line, double complex exact, double
     double complex deviation = frf->real[line] + frf->imag[line] * I - exact;
     TEST_ASSERT_TRUE(frf->valid[line]);
     io_tally->predicted += frf->std[line] * frf->std[line];
-    io_tally->empirical += power(deviation);
+    io_tally->empirical += cmplx_power(deviation);
     io_tally->covered += cabs(deviation) <= factor * frf->std[line];
     io_tally->count += 1.0;
 }
@@ -90,7 +86,7 @@ static void check_formula(const char *name, double complex input, double complex
     struct random random;
     struct tally tally = {0};
     char claim[96];
-    double rest = sqrt(1.0 - power(rho));
+    double rest = sqrt(1.0 - cmplx_power(rho));
     double factor = circle_confidence_factor(0.95, periods - 1);
     random_seed(&random, 24);
     for (int r = 0; r < (claim_long() ? 1000 : 100); r++) {

@@ -107,9 +107,9 @@ text[52][2] = "NaN"
 text[120] = ["", "", ""]
 case("holes", table(names, [r for k, r in enumerate(text) if k != 120]), "refuse 1 sample is missing")
 case("marked_holes", table(names, [[t, m, a] if k != 120 else [comma(time[k]), "", ""] for k, (t, m, a) in enumerate(text)]),
-     "kept: 4 rows with an empty cell, the first in line 52 (Moment [Nm]): marked as lost with valid 0", lost=[50, 51, 52, 120])
+     "kept: 4 rows with an empty cell, the first is row 51 at 0.05 s (Moment [Nm]): marked as lost with valid 0", lost=[50, 51, 52, 120])
 case("no_end", table(names, [r if k < 190 else [r[0], "", r[2]] for k, r in enumerate(plain(comma))]),
-     "lost: the last 10 rows, from line 192: Moment [Nm] has no value in them")
+     "lost: the last 10 rows, from row 191 on: Moment [Nm] has no value in them")
 case("slow_column", table(names + ["Temp [V]"], [r + [comma(k) if k % 10 == 0 else ""] for k, r in enumerate(plain(comma))]),
      "Temp [V] under its own name: 180 of its 200 cells are empty")
 case("states", table(names + ["State", "OK"], [r + ["RUN" if k else "IDLE", "TRUE"] for k, r in enumerate(plain(comma))]),

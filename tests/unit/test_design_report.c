@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /// The excitation section: limits, units and figures are those of the request and the result.
 #include "lab/design/report.h"
+#include "lab/design/report_sequence.h"
 #include "lab/page/page.h"
 
 #include "unity.h"
@@ -126,6 +127,38 @@ static void test_design_report_section_is_one_among_others(void)
     says("Peaks against limits");
 }
 
+/* Nine tables: all of them in the overview, the first six one by one, numbered on from it. */
+static void test_design_report_of_a_sequence_sums_up_first(void)
+{
+    struct error error;
+    struct page page;
+    struct design_report_sequence sequence;
+    size_t size = 0;
+    TEST_ASSERT_TRUE(design_report_sequence_begin(&sequence));
+    for (uint32_t line = 1; line <= 9; line++) {
+        char name[32];
+        request.bins = &bins[line > 8 ? 7 : line - 1];
+        request.bin_count = 1;
+        request.limits.velocity_rad_per_s = line <= 2 ? 0.3 : 30.0;
+        snprintf(name, sizeof name, "seq-%u.mst", line);
+        TEST_ASSERT_EQUAL_MESSAGE(0, design_run(&request, &result, &error), error.message);
+        TEST_ASSERT_TRUE(design_report_sequence_add(&sequence, name, &request, &result));
+        design_result_free(&result);
+    }
+    FILE *stream = open_memstream(&text, &size);
+    page_start(&page, stream, "test", NULL);
+    TEST_ASSERT_TRUE(design_report_sequence_write(&sequence, &page));
+    design_report_sequence_free(&sequence);
+    TEST_ASSERT_EQUAL(0, page_end(&page, NULL));
+    fclose(stream);
+    says("the limit of the torque holds back 7, the limit of the velocity holds back 2");
+    says("<h2><span>1</span> All tables</h2>");
+    says("<h2><span>7</span> seq-6.mst</h2>");
+    says("<td>seq-9.mst</td>");
+    TEST_ASSERT_NULL(strstr(text, "<h2><span>8</span>"));
+    says("<b>Figure 3</b> One period"); // two figures stand before
+}
+
 static void test_design_report_gives_acceleration_a_panel_if_limited(void)
 {
     request.limits.acceleration_rad_per_s2 = 50.0;
@@ -155,6 +188,7 @@ int main(void)
     RUN_TEST(test_design_report_warns_where_a_limit_is_passed_between_samples);
     RUN_TEST(test_design_report_maps_products_and_starts);
     RUN_TEST(test_design_report_section_is_one_among_others);
+    RUN_TEST(test_design_report_of_a_sequence_sums_up_first);
     RUN_TEST(test_design_report_gives_acceleration_a_panel_if_limited);
     RUN_TEST(test_design_report_shows_a_linear_axis_in_its_units);
     return UNITY_END();

@@ -197,8 +197,8 @@ static void test_frf_report_overlays_runs_in_shapes_of_their_own(void)
     says("more than 2 std of the difference apart at 0 of 8 lines");
 }
 
-/* A response of its own lines: 5 % more at every other frequency, 0.025 and 0.0125 apart at 2 and 4 Hz, with 0.01 of std
-   each: 2 std of the difference are 0.0283. */
+/* Lines of its own: 6 % and 5 % more at 2 and 4 Hz are 0.03 and 0.0125 apart; with a std of 0.01 each, 2 std of the
+   difference are 0.0283. */
 static void test_frf_report_holds_a_saved_response_against_this_one(void)
 {
     struct frf other;

@@ -13,7 +13,7 @@
 
 static const double two_pi = 6.283185307179586476925;
 static const double noise = 0.05;
-/// Chance that noise alone is said to change more of the 400 lines of all trials than this over what is stated: 3 sigma.
+/// Three standard deviations of the share among the 400 lines of all trials.
 static const double share_tolerance = 0.03;
 
 enum { samples = 64, settle = 1, periods = 10, rows = (settle + periods) * samples, bin_count = 10, trials = 40 };

@@ -265,62 +265,6 @@ static void test_page_checker_finds_bad_markup(void)
     TEST_ASSERT_NOT_NULL(check_markup("<a b=\"<\"></a>"));
 }
 
-static void test_text_escapes_markup_characters(void)
-{
-    text_write(out, "a<b> & \"c\" 'd'");
-    TEST_ASSERT_EQUAL_STRING("a&lt;b&gt; &amp; &quot;c&quot; &#39;d&#39;", written());
-}
-
-static void test_text_keeps_valid_utf8_and_replaces_the_rest(void)
-{
-    static const char *const cases[][2] = {
-        {"\xC2\xB5m \xE2\x88\x92 \xF0\x9F\x98\x80", "\xC2\xB5m \xE2\x88\x92 \xF0\x9F\x98\x80"},
-        {"a\xFFz", "a\xEF\xBF\xBDz"},                             /* no such byte */
-        {"\xC0\xAF", "\xEF\xBF\xBD\xEF\xBF\xBD"},                 /* overlong slash */
-        {"\xE2\x88", "\xEF\xBF\xBD\xEF\xBF\xBD"},                 /* cut short */
-        {"\xED\xA0\x80", "\xEF\xBF\xBD\xEF\xBF\xBD\xEF\xBF\xBD"}, /* a surrogate */
-        {"a\x01\x7Fz", "a\xEF\xBF\xBD\xEF\xBF\xBDz"},             /* control characters */
-        {"a\tb\nc", "a b c"},
-    };
-    for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        rewind(out);
-        text_write(out, cases[n][0]);
-        fputc('\0', out);
-        TEST_ASSERT_EQUAL_STRING(cases[n][1], written());
-    }
-}
-
-static void test_text_copy_cuts_between_characters(void)
-{
-    char buffer[6];
-    text_copy("abc\xE2\x88\x92", sizeof buffer, buffer);
-    TEST_ASSERT_EQUAL_STRING("abc", buffer);
-    text_copy("ab\xE2\x88\x92", sizeof buffer, buffer);
-    TEST_ASSERT_EQUAL_STRING("ab\xE2\x88\x92", buffer);
-    text_copy(NULL, sizeof buffer, buffer);
-    TEST_ASSERT_EQUAL_STRING("", buffer);
-}
-
-static void test_text_wrap_breaks_at_spaces_and_loses_nothing(void)
-{
-    const char *words = "measured with the table of the first run";
-    struct text_span line[8];
-    int cut = 1;
-    size_t lines = text_wrap(words, 10.0, 8, line, &cut);
-    TEST_ASSERT_GREATER_THAN(1, lines);
-    TEST_ASSERT_EQUAL(0, cut);
-    size_t letters = 0;
-    for (size_t n = 0; n < lines; n++) {
-        TEST_ASSERT_TRUE(text_measure_em(line[n]) <= 10.0);
-        TEST_ASSERT_TRUE(line[n].start[0] != ' ' && line[n].start[line[n].length - 1] != ' ');
-        letters += line[n].length;
-    }
-    TEST_ASSERT_EQUAL(strlen(words) - (lines - 1), letters);
-    TEST_ASSERT_EQUAL(1, text_wrap(words, 10.0, 1, line, &cut));
-    TEST_ASSERT_EQUAL(1, cut);
-    TEST_ASSERT_EQUAL(8, text_wrap("unbreakable_and_far_too_long_for_one_line", 2.0, 8, line, NULL));
-}
-
 static void test_figure_draws_values_where_the_axes_say(void)
 {
     const double x[] = {0.0, 1.0, 2.0, 4.0};
@@ -611,6 +555,54 @@ static void test_figure_escapes_every_label(void)
     }
 }
 
+/* Eight shapes: what each draws, its place taken away, is drawn by no other. */
+static void test_figure_markers_are_eight_shapes(void)
+{
+    const double zero = 0.0;
+    char shapes[figure_triangle_down + 1][160];
+    for (int marker = 0; marker <= (int)figure_triangle_down; marker++) {
+        figure_start(&figure, "time in s", axis_linear);
+        struct figure_panel *panel = figure_add_panel(&figure, "torque in Nm", axis_linear);
+        figure_add_points(panel, "points", 1, &zero, &zero)->marker = (enum figure_marker)marker;
+        const char *path = NULL; // the last one, in the legend of the figure drawn last
+        for (const char *at = strstr(drawn(), "<path class=\"pt"); at; at = strstr(at + 1, "<path class=\"pt")) {
+            path = at;
+        }
+        TEST_ASSERT_NOT_NULL(path);
+        snprintf(shapes[marker], sizeof shapes[marker], "%.159s", path);
+        *strchr(shapes[marker], '>') = '\0';
+        for (int other = 0; other < marker; other++) {
+            TEST_ASSERT_TRUE(strcmp(shapes[marker], shapes[other]) != 0);
+        }
+    }
+}
+
+static void test_figure_legend_shortens_what_does_not_fit(void)
+{
+    const double y[] = {0.0, 1.0};
+    figure.legend = figure_legend_right;
+    struct figure_panel *panel = figure_add_panel(&figure, "torque in Nm", axis_linear);
+    figure_add_points(panel, "a_recording_with_a_name_that_goes_on_and_on_for_much_longer_than_any_legend_has_room.csv",
+                      2, NULL, y);
+    const char *svg = drawn();
+    TEST_ASSERT_NOT_NULL(strstr(svg, "a_recording_with"));
+    TEST_ASSERT_NOT_NULL(strstr(svg, "\xE2\x80\xA6"));
+    TEST_ASSERT_NOT_NULL(strstr(svg, ".csv</text>"));
+}
+
+/* The second "on a line" has points: it needs a swatch of its own, which "on a line (no data)" is not. */
+static void test_figure_legend_repeats_a_name_whose_first_has_a_remark(void)
+{
+    const double gap[] = {NAN, NAN}, y[] = {1.0, 2.0};
+    for (int p = 0; p < 2; p++) {
+        struct figure_panel *panel = figure_add_panel(&figure, "torque in Nm", axis_linear);
+        figure_add_points(panel, "on a line", 2, NULL, p == 0 ? gap : y);
+    }
+    const char *svg = drawn();
+    TEST_ASSERT_NOT_NULL(strstr(svg, ">on a line (no data)<"));
+    TEST_ASSERT_NOT_NULL(strstr(svg, ">on a line<"));
+}
+
 static void test_figure_series_differ_by_more_than_colour(void)
 {
     struct figure_panel *panel = figure_add_panel(&figure, "torque in Nm", axis_linear);
@@ -767,10 +759,6 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_page_checker_finds_bad_markup);
-    RUN_TEST(test_text_escapes_markup_characters);
-    RUN_TEST(test_text_keeps_valid_utf8_and_replaces_the_rest);
-    RUN_TEST(test_text_copy_cuts_between_characters);
-    RUN_TEST(test_text_wrap_breaks_at_spaces_and_loses_nothing);
     RUN_TEST(test_figure_draws_values_where_the_axes_say);
     RUN_TEST(test_figure_clips_a_line_at_its_crossing);
     RUN_TEST(test_figure_clips_lines_that_pass_through_the_frame);
@@ -788,6 +776,9 @@ int main(void)
     RUN_TEST(test_figure_without_panels_is_well_formed);
     RUN_TEST(test_figure_counts_series_it_cannot_hold);
     RUN_TEST(test_figure_escapes_every_label);
+    RUN_TEST(test_figure_markers_are_eight_shapes);
+    RUN_TEST(test_figure_legend_shortens_what_does_not_fit);
+    RUN_TEST(test_figure_legend_repeats_a_name_whose_first_has_a_remark);
     RUN_TEST(test_figure_series_differ_by_more_than_colour);
     RUN_TEST(test_figure_bars_stand_on_zero_with_their_values);
     RUN_TEST(test_page_is_well_formed_whatever_the_text);

@@ -434,6 +434,12 @@ static void test_tune_json_and_page_hold_no_number_that_is_none(void)
     TEST_ASSERT_NULL(strstr(body, " nan"));
     TEST_ASSERT_NULL(strstr(body, ">inf"));
     TEST_ASSERT_NOT_NULL(strstr(body, "Nyquist plot"));
+    TEST_ASSERT_NOT_NULL(strstr(body, "residual over 2 std: T less reference"));
+    // The result first, then what it rests on; measured lines are points, the reference and the circles are lines.
+    const char *result_first = strstr(body, "The closed loop follows"), *then = strstr(body, "Controller</h2>");
+    TEST_ASSERT_TRUE(result_first && then && result_first < then);
+    TEST_ASSERT_NOT_NULL(strstr(body, "data-n=\"T, measured lines\""));
+    TEST_ASSERT_NULL(strstr(body, "data-d=\"0\" d=\"M")); // no solid line
     free(text);
     cJSON *json = tune_json("f.csv", &result);
     const cJSON *gain = cJSON_GetObjectItem(cJSON_GetObjectItem(json, "gains"), "proportional_Nms_per_rad");

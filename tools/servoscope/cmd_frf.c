@@ -473,14 +473,17 @@ static int estimate_matrix(const struct estimating_options *arguments, const str
 static int estimate_and_report(const struct estimating_options *arguments, const struct estimating_request *request,
                                const struct command_context *context, struct error *out_error)
 {
-    struct estimating_outcome outcome;
-    int status = estimate_all(arguments, request, &outcome, out_error);
+    struct estimating_outcome outcome = {.run_count = 0};
+    struct comparing compared = {0};
+    int status = comparing_read(&arguments->compare, &compared, out_error);
+    status = status ? status : estimate_all(arguments, request, &outcome, out_error);
     if (status == estimating_is_matrix) {
         status = estimate_matrix(arguments, request, context, out_error);
     } else if (!status) {
-        status = write_and_report(arguments, &outcome, context, out_error);
+        status = write_and_report(arguments, &outcome, &compared, context, out_error);
     }
     estimating_outcome_free(&outcome);
+    comparing_free(&compared);
     return status;
 }
 

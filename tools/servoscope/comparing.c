@@ -123,7 +123,7 @@ static int write_page(const struct comparing_request *request, const struct comp
 {
     struct atomic_file file;
     struct page page;
-    char title[192];
+    char title[600];
     char subtitle[320];
     const struct frf_report_options options = {
         .name = all->names[0],

@@ -16,7 +16,7 @@
 #define SERVOSCOPE_VERSION "0.1.0"
 #endif
 
-enum { name_size = 96, grid_points = 800, settling_runs_max = 5 };
+enum { name_size = 400, grid_points = 800, settling_runs_max = 5 };
 
 static const char *file_name(const char *path)
 {
@@ -214,9 +214,10 @@ static void add_result(const struct remarks *remarks, struct page *page)
     const struct remark *uncertainty = find_fact(remarks, "uncertainty");
     const struct remark *realisations = find_fact(remarks, "realisations");
     if (response) {
-        page_add_note(page, page_plain, response->text, "%s%s%s%s%s", uncertainty ? "Uncertainty: " : "",
+        page_add_note(page, page_plain, response->text, "%s%s%s%s%s%s", uncertainty ? "Uncertainty: " : "",
                       uncertainty ? uncertainty->text : "", uncertainty ? ". " : "",
-                      realisations ? realisations->text : "", realisations ? "." : "");
+                      realisations ? "Realisations: " : "", realisations ? realisations->text : "",
+                      realisations ? "." : "");
     }
 }
 
@@ -241,7 +242,7 @@ int estimating_page_write(const char *path, const struct estimating_page_item *i
     struct page page;
     char names[name_size];
     char title[name_size + 32];
-    char subtitle[320];
+    char subtitle[name_size];
     const struct frf *first = &items[0].outcome->frf;
     FILE *stream = atomic_file_open(out_file, path, out_error);
     if (!stream) {

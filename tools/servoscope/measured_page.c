@@ -16,7 +16,7 @@
 static int start(const char *path, const char *out, const char *subtitle, struct atomic_file *out_file,
                  struct page *out_page, struct error *out_error)
 {
-    char title[160];
+    char title[300];
     FILE *stream = atomic_file_open(out_file, path, out_error);
     if (!stream) {
         return error_refused;

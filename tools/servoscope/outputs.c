@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 /// Whether two names lead to one ordinary file.
@@ -32,7 +33,8 @@ static bool is_among(const char *path, const char *const *others, size_t count)
     return false;
 }
 
-enum { probe_bytes = 1 << 16 };
+/// What is written to try a disk, and what has to be free on it: the smallest result with room around it.
+enum { probe_bytes = 4096, free_bytes = 1 << 16 };
 
 /// A device that is no terminal takes a line end, or it takes nothing: /dev/full.
 static int check_device(const char *path, struct error *out_error)
@@ -52,6 +54,11 @@ static int check_device(const char *path, struct error *out_error)
 static int probe_folder(const char *path, const char *folder, struct error *out_error)
 {
     static const char nothing[probe_bytes];
+    struct statvfs disk;
+    if (statvfs(folder, &disk) == 0 && disk.f_blocks > 0 &&
+        (double)disk.f_bavail * (double)disk.f_frsize < free_bytes) {
+        return error_set(out_error, error_refused, "%s: cannot be written: %s", path, strerror(ENOSPC));
+    }
     const size_t size = strlen(folder) + 32;
     char *name = malloc(size);
     if (!name) {
