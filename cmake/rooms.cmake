@@ -2,15 +2,12 @@
 # One function per kind of target. Sources of a room are all its .c files, so that adding an effect or a subcommand
 # is adding one file.
 
-# servoscope_room(NAME DIR [C99] LINKS...)   static library servoscope_NAME, alias servoscope::NAME, if DIR has sources.
+# servoscope_room(NAME DIR [C99] LINKS...)   static library servoscope_NAME, alias servoscope::NAME.
 # C99: a room of lib/: freestanding C99 with the strict warnings; the others are hosted C11.
-# Rooms that exist are listed in the global property servoscope_rooms, topmost first, for those who link them all.
+# All rooms are listed in the global property servoscope_rooms, topmost first, for those who link them all.
 function(servoscope_room name dir)
   cmake_parse_arguments(arg "C99" "" "LINKS;EXTRA" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${dir}/*.c)
-  if(NOT sources AND NOT arg_EXTRA)
-    return()
-  endif()
   add_library(servoscope_${name} STATIC ${sources} ${arg_EXTRA})
   add_library(servoscope::${name} ALIAS servoscope_${name})
   target_include_directories(servoscope_${name} PUBLIC
@@ -23,14 +20,7 @@ function(servoscope_room name dir)
     target_include_directories(servoscope_${name} PUBLIC ${PROJECT_SOURCE_DIR})
     target_link_libraries(servoscope_${name} PRIVATE servoscope_warnings servoscope_host)
   endif()
-  foreach(link ${arg_LINKS})
-    if(link MATCHES "^servoscope_" AND NOT TARGET ${link})
-      # A room without sources yet is no target; what needs it then fails to link by the name of the missing function.
-      target_link_libraries(servoscope_${name} PUBLIC $<TARGET_NAME_IF_EXISTS:${link}>)
-    else()
-      target_link_libraries(servoscope_${name} PUBLIC ${link})
-    endif()
-  endforeach()
+  target_link_libraries(servoscope_${name} PUBLIC ${arg_LINKS})
   get_property(rooms GLOBAL PROPERTY servoscope_rooms)
   set_property(GLOBAL PROPERTY servoscope_rooms servoscope_${name} ${rooms})
 endfunction()

@@ -369,7 +369,7 @@ static bool hangs_loose(const struct state *s, const struct sim_stepper *stepper
     return belt.twist == 0.0 && belt.twist_rate == 0.0;
 }
 
-/// What a gap takes of the twist: half of it, to the side on which the belt pulls; all of the twist where it hangs loose.
+/// What a gap takes of the twist: half of it, to the side on which the belt pulls; all of it where it hangs loose.
 static double taken_twist(const struct state *s, const struct sim_stepper *stepper)
 {
     return s->position[0] - s->position[1] - belt_of(s, stepper).twist;
@@ -411,11 +411,10 @@ static double step_to_edge(struct state *io, const struct sim_stepper *stepper, 
     return high_s;
 }
 
-/// A step during which a belt may go slack, tight, or through its gap: split there. The instants have to be exact, or
-/// what is predicted would jump with what moves them.
-static void step_belt(struct state *io, const struct sim_stepper *stepper, double torque, double dt_s)
+/// A step during which a belt may go slack, tight, or through its gap, split there.
+static void step_through_edges(struct state *io, const struct sim_stepper *stepper, double torque, double dt_s)
 {
-    enum { events_max = 6 };
+    enum { events_max = 4 };
     double left_s = dt_s;
     for (int event = 0; left_s > 0.0; event++) {
         struct state next = *io;
@@ -426,6 +425,23 @@ static void step_belt(struct state *io, const struct sim_stepper *stepper, doubl
         }
         left_s -= step_to_edge(io, stepper, torque, left_s, &next);
     }
+}
+
+/// The belt's torque jumps at the edge of a gap by what its damper makes, which a step that ends there feels ahead:
+/// near that instant steps are shorter. The instant itself has to be exact, or what is predicted would jump with
+/// whatever moves it.
+static void step_belt(struct state *io, const struct sim_stepper *stepper, double torque, double dt_s)
+{
+    enum { parts = 16 };
+    struct state next = *io;
+    int side = pulled_side(io, stepper);
+    step_with_reversal(&next, stepper, torque, dt_s);
+    if (side == pulled_side(&next, stepper)) {
+        *io = next;
+        return;
+    }
+    for (int i = 0; i < parts; i++)
+        step_through_edges(io, stepper, torque, dt_s / parts);
 }
 
 /// Rate that friction which builds up asks for: of the motor swinging on it, and of the way in which it does so.

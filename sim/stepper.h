@@ -44,9 +44,9 @@ struct sim_stepper {
     struct sim_model model;
     double dt_s;
     struct sim_chain chain;
-    double chain_rate;          ///< rad/s, bound on the fastest mode
-    size_t inner_steps;         ///< that Runge-Kutta needs for it
-    double build_up;            ///< distance over which dry friction builds up; 0: it switches
+    double chain_rate;  ///< rad/s, bound on the fastest mode
+    size_t inner_steps; ///< that Runge-Kutta needs for it
+    double build_up;    ///< distance over which dry friction builds up; 0: it switches
     double build_up_exponent;
     struct sim_opposing steady; ///< the model's friction and the effects that are the same at every instant
     struct sim_hooked oppose;   ///< the others

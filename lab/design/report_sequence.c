@@ -32,10 +32,16 @@ bool design_report_sequence_begin(struct design_report_sequence *out)
 static bool grow(struct design_report_sequence *self, size_t lines)
 {
     struct design_report_table *tables = realloc(self->tables, (self->count + 1) * sizeof *tables);
-    self->tables = tables ? tables : self->tables;
+    if (!tables) {
+        return false;
+    }
+    self->tables = tables;
     double *numbers = realloc(self->lines, 3 * (self->line_count + lines) * sizeof *numbers);
-    self->lines = numbers ? numbers : self->lines;
-    return tables && numbers;
+    if (!numbers) {
+        return false;
+    }
+    self->lines = numbers;
+    return true;
 }
 
 /// The three arrays lie behind each other, so that they move apart when they grow.

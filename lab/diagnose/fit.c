@@ -360,6 +360,14 @@ static bool is_rough(const struct fit_data *data, const struct hypothesis *h)
     return false;
 }
 
+/// Covariance, by the derivatives at x or, for a rough residual, by secants about it.
+static bool finish(struct fit *self, const struct fit_data *data, struct hypothesis *h, double *work)
+{
+    double x[hypothesis_coordinates_max];
+    bool good = solve_step(self, h, 0.0, INFINITY, work, x, self->covariance);
+    return good && is_rough(data, h) ? polish(self, data, h) : good;
+}
+
 static bool improve(struct fit *self, const struct fit_data *data, struct hypothesis *h, const struct lender *lender,
                     const struct course *course)
 {
@@ -389,10 +397,8 @@ static bool improve(struct fit *self, const struct fit_data *data, struct hypoth
     if (good && course->finish) {
         if (!fresh)
             differentiate(self, data, h, lender);
-        good = solve_step(self, h, 0.0, INFINITY, work, x, self->covariance);
+        good = finish(self, data, h, work);
     }
-    if (good && course->finish && is_rough(data, h))
-        good = polish(self, data, h);
     self->prior = prior_cost(h, h->x);
     free(work);
     return good;

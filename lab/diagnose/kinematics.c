@@ -17,7 +17,8 @@ void kinematics_free(struct kinematics *self)
     memset(self, 0, sizeof *self);
 }
 
-bool kinematics_concern(const struct sim_model *model)
+/// Whether a model has an effect on that acts on the sensors.
+static bool acts_on_sensors(const struct sim_model *model)
 {
     for (size_t e = 0; sim_effects[e]; e++)
         if (model->effect_on[e] && sim_effects[e]->sense)
@@ -215,7 +216,7 @@ bool kinematics_residual(const struct evidence *evidence, const struct sim_model
     const struct recording *r = evidence->recording;
     if (self->values == 0)
         return true;
-    if (!kinematics_concern(model)) {
+    if (!acts_on_sensors(model)) {
         memcpy(out, self->target, self->values * sizeof *out);
         return true;
     }

@@ -30,9 +30,6 @@ void kinematics_free(struct kinematics *self);
 /// Errors: false if memory is short.
 bool kinematics_estimate_noise(struct evidence *evidence, const struct sim_model *model);
 
-/// Whether a model has an effect on that acts on the sensors.
-bool kinematics_concern(const struct sim_model *model);
-
 /// Residual of the difference under a model, whitened; nuisances taken out.
 /// Shapes: out: evidence->kinematics.values
 /// Errors: false if memory is short

@@ -23,8 +23,8 @@ bool evidence_init(struct evidence *self, const struct recording *recording, dou
     self->factor = calloc(4 * bins, sizeof(double));
     self->between = calloc(4 * bins, sizeof(double));
     self->work = malloc((4 * n + 2 * n + 4 * bins) * sizeof(double));
-    if (self->plan && self->covariance && self->factor && self->between && self->work && contrast_init(&self->contrast, recording) &&
-        kinematics_init(self)) {
+    if (self->plan && self->covariance && self->factor && self->between && self->work &&
+        contrast_init(&self->contrast, recording) && kinematics_init(self)) {
         self->values += self->kinematics.values;
         self->allowances = calloc(evidence_allowances * self->values, sizeof *self->allowances);
         if (self->allowances)

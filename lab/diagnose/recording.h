@@ -21,15 +21,15 @@ struct stretch {
     double *torque_ref; ///< NULL: the run has none; then the measured torque drives the model
     double *torque;
     double *position;
-    double *velocity;   ///< best estimate from the position and, if there is one, the speed column
+    double *velocity;     ///< best estimate from the position and, if there is one, the speed column
     double position_gain; ///< share that a measured position has in where the motor is, beside where it was and what
                           ///< speed has taken it from there; 0 counts as 1: all of it
-    double *kinematics; ///< speed column less the derivative of the position column; NULL: not both are there
-    double start_s;     ///< time of the first sample since the run began; of a mean of periods the middle of them all,
-                        ///< where the clock of effects that depend on time stands still
-    bool held;          ///< the torque of a row acts until the next, instead of going straight there
-    bool still;         ///< nothing accelerates: all of the torque goes against friction and what depends on place
-    bool *lost;         ///< rows that were not measured: NULL if there are none, and in a mean of periods
+    double *kinematics;   ///< speed column less the derivative of the position column; NULL: not both are there
+    double start_s; ///< time of the first sample since the run began; of a mean of periods the middle of them all,
+                    ///< where the clock of effects that depend on time stands still
+    bool held;      ///< the torque of a row acts until the next, instead of going straight there
+    bool still;     ///< nothing accelerates: all of the torque goes against friction and what depends on place
+    bool *lost;     ///< rows that were not measured: NULL if there are none, and in a mean of periods
 };
 
 struct recording {

@@ -233,7 +233,7 @@ static void add_parameter_rows(struct page *page, const struct diagnosis_cause *
     const struct sim_effect *effect = sim_effects[cause->effect];
     char name[wording_short], evidence[wording_short];
     wording_effect(cause->effect, name);
-    snprintf(evidence, sizeof evidence, isfinite(cause->evidence) ? "%.1f" : "unknown", cause->evidence);
+    wording_evidence(cause->evidence, evidence);
     for (size_t i = 0; i < effect->parameter_count; i++) {
         const struct sim_parameter *parameter = &effect->parameters[i];
         char estimate[2 * wording_short], given[wording_short];
@@ -248,7 +248,7 @@ static void add_parameter_rows(struct page *page, const struct diagnosis_cause *
 static void add_cause_list(struct page *page, const struct diagnosis *self, const struct diagnosis_cause *causes,
                            size_t count, const char *caption)
 {
-    static const char *const heads[] = {"cause", "parameter", "given", "estimate ± std", "evidence in nats"};
+    static const char *const heads[] = {"cause", "parameter", "given", "estimate ± std", "evidence"};
     page_start_list(page);
     for (size_t i = 0; i < count; i++) {
         char name[wording_short], says[wording_size], unseen[wording_size];

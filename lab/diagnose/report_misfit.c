@@ -59,11 +59,11 @@ static bool is_logarithmic(const struct misfit_axis *axis, enum misfit_axis_kind
 
 static void add_figure(struct page *page, const struct diagnosis *self, enum misfit_axis_kind kind, const char *best)
 {
-    static const char *const captions[misfit_axes] = {[misfit_frequency] = "Against frequency.",
-                                                      [misfit_speed] = "Against speed.",
-                                                      [misfit_position] = "Against position.",
-                                                      [misfit_time] = "Over the whole run, period by period.",
-                                                      [misfit_level] = "Against the level."};
+    static const char *const captions[misfit_axes] = {[misfit_frequency] = "Residual over expected against frequency.",
+                                                      [misfit_speed] = "Residual over expected against speed.",
+                                                      [misfit_position] = "Residual over expected against position.",
+                                                      [misfit_time] = "Residual over expected over the whole run.",
+                                                      [misfit_level] = "Residual over expected against the level."};
     const struct misfit_axis *axis = &self->misfit.axes[kind];
     const double far = 5.0; // times the noise: a linear axis would hide what is near it
     struct points points;
@@ -110,7 +110,7 @@ static void add_directions(struct page *page, const struct diagnosis *self, cons
     left->colour = figure_green;
     left->dash = figure_dashed;
     figure_add_limit(panel, "noise", 1.0);
-    page_add_figure(page, &figure, "By direction of motion.");
+    page_add_figure(page, &figure, "Residual over expected by direction of motion.");
 }
 
 static void add_figures(struct page *page, const struct diagnosis *self, const char *best)

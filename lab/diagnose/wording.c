@@ -108,6 +108,14 @@ void wording_percent(double share, char out_text[wording_short])
     }
 }
 
+void wording_evidence(double nats, char out_text[wording_short])
+{
+    if (isfinite(nats) && nats <= 0.0)
+        snprintf(out_text, wording_short, "none beside the others");
+    else
+        snprintf(out_text, wording_short, isfinite(nats) ? "%.1f nats" : "unknown", nats);
+}
+
 void wording_estimate(double value, double deviation, char out_text[2 * wording_short])
 {
     const size_t size = 2 * wording_short;

@@ -27,6 +27,9 @@ void wording_effect(int effect, char out_text[wording_short]);
 /// A share as a percentage of three digits: "4.81 %"; "unknown" if it is not finite.
 void wording_percent(double share, char out_text[wording_short]);
 
+/// Evidence: "123.4 nats"; "none beside the others" where a fit does no worse without.
+void wording_evidence(double nats, char out_text[wording_short]);
+
 /// An estimate with the digits that its standard deviation allows: "0.03120 ± 0.00042".
 void wording_estimate(double value, double deviation, char out_text[2 * wording_short]);
 

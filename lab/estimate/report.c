@@ -110,12 +110,16 @@ static void add_curves(const struct report_drawing *drawing, const struct frf_re
             figure_add_band(panels->magnitude, "", model->count, model->frequency_hz, curve->low_db, curve->high_db)
                 ->colour = curve_colours[c];
         }
-        struct figure_series *series[2] = {
-            figure_add_line(panels->magnitude, model->name, model->count, model->frequency_hz, curve->magnitude_db),
-            figure_add_line(panels->phase, "", model->count, model->frequency_hz, curve->phase_deg)};
+        struct figure_panel *const panel[2] = {panels->magnitude, panels->phase};
+        const double *const values[2] = {curve->magnitude_db, curve->phase_deg};
         for (size_t i = 0; i < 2; i++) {
-            series[i]->colour = curve_colours[c];
-            series[i]->dash = curve_dashes[c];
+            const char *name = i == 0 ? model->name : "";
+            struct figure_series *series =
+                model->at_lines ? figure_add_points(panel[i], name, model->count, model->frequency_hz, values[i])
+                                : figure_add_line(panel[i], name, model->count, model->frequency_hz, values[i]);
+            series->colour = curve_colours[c];
+            series->dash = curve_dashes[c];
+            series->marker = curve_markers[c];
         }
     }
 }

@@ -6,6 +6,7 @@
 #include "lab/page/page.h"
 #include "lab/record/frf_file.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 
 enum {
@@ -21,6 +22,7 @@ struct frf_model_curve {
     const double *real;
     const double *imag;
     const double *std; ///< its own standard deviation; NULL: not known
+    bool at_lines;     ///< simulated at the measured lines: nothing is known in between, so that no line joins them
 };
 
 struct frf_report_options {

@@ -23,7 +23,8 @@ struct text_span layout_span(const char *text)
     return (struct text_span){text, strlen(text)};
 }
 
-double layout_measure_px(const char *text)
+/// Estimates the width of a text in px, never too small.
+static double measure_px(const char *text)
 {
     return layout_font_px * text_measure_em(layout_span(text));
 }
@@ -228,10 +229,10 @@ static double find_left(const struct layout *self)
     for (size_t p = 0; p < self->figure->count; p++) {
         const struct axis_ticks *ticks = &self->y_ticks[p];
         for (size_t n = 0; n < ticks->count; n++) {
-            widest = fmax(widest, layout_measure_px(ticks->tick[n].label));
+            widest = fmax(widest, measure_px(ticks->tick[n].label));
         }
         if (ticks->exponent != 0) {
-            widest = fmax(widest, layout_measure_px("x 10-000"));
+            widest = fmax(widest, measure_px("x 10-000"));
         }
     }
     return fmax(layout_left_px, layout_edge_px + widest + layout_label_gap_px);
@@ -441,11 +442,11 @@ void layout_choose_labels(const struct axis *axis, const struct axis_ticks *tick
             if ((int)ticks->tick[n].rank != rank) {
                 continue;
             }
-            double size = along ? layout_measure_px(ticks->tick[n].label) : layout_font_px;
+            double size = along ? measure_px(ticks->tick[n].label) : layout_font_px;
             double place = length * axis_map(axis, ticks->tick[n].value);
             bool free_place = true;
             for (size_t m = 0; m < ticks->count; m++) {
-                double other = along ? layout_measure_px(ticks->tick[m].label) : layout_font_px;
+                double other = along ? measure_px(ticks->tick[m].label) : layout_font_px;
                 double apart = fabs(length * axis_map(axis, ticks->tick[m].value) - place);
                 free_place = free_place && (!out_shown[m] || apart >= 0.5 * (size + other) + air_px);
             }

@@ -61,9 +61,6 @@ size_t layout_wrap_label(const char *text, double width, struct text_span *out_l
 /// Breaks the name of a category into at most layout_category_lines_max lines that fit its place.
 size_t layout_wrap_category(const struct layout *self, size_t n, struct text_span *out_lines);
 
-/// Estimates the width of a text in px, never too small.
-double layout_measure_px(const char *text);
-
 /// The whole of a string.
 struct text_span layout_span(const char *text);
 

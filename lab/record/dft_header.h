@@ -11,8 +11,12 @@
 enum dft_header_kind {
     dft_header_block = 1,  ///< coefficients of the block DFT (frf/block_table.h), in the layout that costs least
     dft_header_folded = 2, ///< instead, with the period folded where the lines allow it
-    dft_header_q15 = 4,    ///< sines of the exact DFT (frf/twiddle.h)
-    dft_header_q31 = 8
+    dft_header_q15 = 4,    ///< sines of the exact DFT (frf/twiddle.h), of a whole period
+    dft_header_q23 = 8,
+    dft_header_q31 = 16,
+    dft_header_quarter_q15 = 32, ///< of a quarter
+    dft_header_quarter_q23 = 64,
+    dft_header_quarter_q31 = 128
 };
 
 /// Reads "block,q15": kinds with commas between them; `name` is for messages.

@@ -53,8 +53,7 @@ static bool has_own_name(const char *line)
     if (copy && foreign_cells_split(copy, ',', &cells, &error) == 0)
         for (size_t i = 0; i < cells.count && !own; i++)
             own = strcmp(cells.items[i], "frequency_hz") == 0 ||
-                  (run_name_axis(cells.items[i]) != run_axis_unknown && strcmp(cells.items[i], "time_s") != 0 &&
-                   strcmp(cells.items[i], "valid") != 0);
+                  (run_name_axis(cells.items[i]) != run_axis_unknown && strcmp(cells.items[i], "time_s") != 0);
     foreign_cells_free(&cells);
     free(copy);
     return own;

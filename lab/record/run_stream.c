@@ -53,6 +53,24 @@ static int guess_names(struct run_stream *self, struct run_map *out_map, struct 
     return status ? status : run_guess_note(out_map, &self->text.table, out_error);
 }
 
+/* A table of another program that is refused here may be one that convert reads: whoever is refused is told. */
+static int say_convert(const char *path, int status, struct error *io_error)
+{
+    struct error ignored;
+    const struct record_format *format;
+    struct stat file;
+    const bool told =
+        !io_error || strstr(io_error->message, "servoscope convert") || strstr(io_error->message, "--map");
+    if (status != error_refused || told || stat(path, &file) != 0 || !S_ISREG(file.st_mode) ||
+        format_by_content(path, &format, &ignored) != 0)
+        return status;
+    const size_t length = strlen(io_error->message);
+    if (strcmp(format->name, "text") == 0 || strcmp(format->name, "twincat") == 0)
+        snprintf(io_error->message + length, sizeof io_error->message - length,
+                 "; 'servoscope convert' makes a run of other programs' tables");
+    return status;
+}
+
 static int open_all(struct run_stream *self, const char *path, struct error *out_error)
 {
     struct run_map map = {0};
@@ -60,7 +78,7 @@ static int open_all(struct run_stream *self, const char *path, struct error *out
     if (!status)
         status = run_map_parse(&map, self->options.map, out_error);
     if (!status)
-        status = text_stream_open(path, run_map_judge, &map, &self->text, out_error);
+        status = say_convert(path, text_stream_open(path, run_map_judge, &map, &self->text, out_error), out_error);
     if (!status && self->options.guess && map.count == 0) {
         run_map_free(&map);
         status = guess_names(self, &map, out_error);
@@ -80,24 +98,6 @@ static int open_all(struct run_stream *self, const char *path, struct error *out
     return status;
 }
 
-/* A table of another program that is refused here may be one that convert reads: whoever is refused is told. */
-static int say_convert(const char *path, int status, struct error *io_error)
-{
-    struct error ignored;
-    const struct record_format *format;
-    struct stat file;
-    const bool told =
-        !io_error || strstr(io_error->message, "servoscope convert") || strstr(io_error->message, "--map");
-    if (status != error_refused || told || stat(path, &file) != 0 || !S_ISREG(file.st_mode) ||
-        format_by_content(path, &format, &ignored) != 0)
-        return status;
-    const size_t length = strlen(io_error->message);
-    if (strcmp(format->name, "text") == 0 || strcmp(format->name, "twincat") == 0)
-        snprintf(io_error->message + length, sizeof io_error->message - length,
-                 "; 'servoscope convert' makes a run of other programs' tables");
-    return status;
-}
-
 int run_stream_open(const char *path, const struct run_options *options, struct run_stream **out_self,
                     struct error *out_error)
 {
@@ -112,7 +112,7 @@ int run_stream_open(const char *path, const struct run_options *options, struct 
         run_stream_close(self);
     else
         *out_self = self;
-    return say_convert(path, status, out_error);
+    return status;
 }
 
 int run_stream_fill(struct run_stream *self, size_t rows, struct error *out_error)
@@ -122,6 +122,7 @@ int run_stream_fill(struct run_stream *self, size_t rows, struct error *out_erro
         size_t first = self->text.table.rows;
         size_t piece = rows - first < piece_rows ? rows - first : piece_rows;
         status = text_stream_fill(&self->text, first + piece, out_error);
+        status = say_convert(self->text.table.path, status, out_error);
         if (!status)
             status = run_map_fill(&self->plan, &self->text.table, first, out_error);
         self->run.sample_rate_hz = self->key_rate_hz;
@@ -129,7 +130,7 @@ int run_stream_fill(struct run_stream *self, size_t rows, struct error *out_erro
             status = run_checks_rows(&self->checks, &self->text.table, &self->run, first, out_error);
     }
     view(self);
-    return say_convert(self->text.table.path, status, out_error);
+    return status;
 }
 
 const struct run *run_stream_run(const struct run_stream *self)

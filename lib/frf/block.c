@@ -205,8 +205,8 @@ static uint32_t work_on_bins(struct frf_block *self, uint32_t owed)
     return owed;
 }
 
-/* Two rows of the basis take long, and there are few: they are gone through in segments. The rotation behind them is 0:
- * whatever was in `projected` is gone. */
+/* Two rows of the basis take long, and there are few: they are gone through in segments. Where the kernel takes them
+ * whole their rotation is 0, so that whatever was in `projected` is gone. */
 static uint32_t work_on_basis(struct frf_block *self, uint32_t owed)
 {
     struct frf_block_run *run = &self->run;
@@ -215,7 +215,7 @@ static uint32_t work_on_basis(struct frf_block *self, uint32_t owed)
     FRF_BLOCK_SUM(run->accumulators, run->rows, run->data + 4u * run->groups, groups, run->groups == 0);
     run->rows += 8u * groups;
     run->groups += groups;
-    if (groups == left) {
+    if (run->groups == all) {
         frf_block_end_sum(run->accumulators);
         run->accumulators += 4;
         run->rows += 4;
@@ -254,8 +254,8 @@ static void finish_work(struct frf_block *self)
     }
 }
 
-/* Only what completes a period is of use where the one being filled is dropped or spoilt. A bank that has not been begun
- * still is to be. */
+/* Only what completes a period is of use where the one being filled is dropped or spoilt. A bank that has not been
+ * begun still is to be. */
 static void leave_work(struct frf_block *self)
 {
     if (self->run.last) {

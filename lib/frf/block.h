@@ -13,9 +13,9 @@
 /// L = 32 (1.7: 64), below 0.1 of the sample rate 0.7 to 0.9, below 0.02 of it 0.35, odd lines 1.0, if fed in blocks;
 /// a call per frame costs some 55 instructions more, whatever the bins and channels: 0.27 at one channel, 0.09 at three
 /// (odd lines twice that). Samples are folded as they arrive; the rest comes in a burst every L samples, or evenly over
-/// the following ones (`spread`): then the longest call is 1.2 to 2.2 times the mean one, and a period's result is there
-/// L - 1 samples later. Where L does not divide the period, two blocks of it are worked on in between half of L and L.
-/// Where it is folded (Q), all work falls into the last Qth of the period. The results are the same bits either way.
+/// the following ones (`spread`): then the longest call is 1.2 to 2.3 times the mean one, and a period's result is
+/// there L - 1 samples later. Where L does not divide the period, two blocks of it are worked on in between half of L
+/// and L. Where it is folded (Q), all work falls into its last Qth. The results are the same bits either way.
 ///
 /// Periods, banks, reasons and the reader's side are those of frf/dft.h. With one bank the last period stays readable
 /// until the first block of the next one is worked on, with two for a whole period.

@@ -127,8 +127,8 @@ static bool build_row(int32_t *rows, int32_t *basis, const struct frf_block_tabl
     return true;
 }
 
-/* The last block's centre is (blocks - 1) L + (L - 1)/2 samples after the first one's begin, which is the zeros in front
- * before n = 0 of the folded period. */
+/* The last block's centre is (blocks - 1) L + (L - 1)/2 samples after the first one's begin, which is the zeros in
+ * front before n = 0 of the folded period. */
 static void build_restore(int32_t *restore, const struct frf_block_table *table)
 {
     uint32_t block = table->layout.block_samples, period = table->period_samples;

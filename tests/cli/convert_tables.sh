@@ -47,6 +47,11 @@ grep -q 'lost: Time: its times are coarser than the samples' said || fail "$(cat
 "$SERVOSCOPE" convert ticks.csv rated.csv --map "time_s=Time*1,torque_Nm=M" --quiet || fail "a factor for an unknown unit of time"
 grep -qx '# remark: cold' preamble.out || fail "$(head -5 preamble.out)"
 grep -qx '# Logger 3000; Version 2,1' preamble.out || fail "$(head -5 preamble.out)"
+# What reads recordings by itself says where to go with a table that it does not take.
+for name in iso units_row two_line_names utf16_be bars preamble no_names quoted_commas semicolon_comma zipped; do
+    "$SERVOSCOPE" frf "$name.csv" --out x.csv 2>err && fail "frf takes $name.csv"
+    grep -q "'servoscope convert'" err || fail "frf of $name.csv: $(cat err)"
+done
 # Marked gaps are what frf leaves out, and what a converted file says stays when it is converted again.
 "$SERVOSCOPE" convert marked_holes.out again.csv --quiet
 cmp marked_holes.out again.csv || fail "a converted table changes when it is converted again"

@@ -70,36 +70,85 @@ static int check(void)
 }
 #else
 static union frf_word words[FRF_STORAGE_WORDS(K, 1u)];
+static const struct frf_dft_config config = {IT(_bins), K, 1, words, sizeof words / sizeof *words, 0, 0};
+
+/* What is built equals what is in flash, and what is in flash runs. */
+#define CHECK(kind, init, number, word, words_of)                                                                      \
+    static int check_##kind##_##number(struct frf_dft *dft)                                                            \
+    {                                                                                                                  \
+        static word built[words_of(N)];                                                                                \
+        struct frf_##kind##_##number table;                                                                            \
+        return frf_##kind##_build_##number(built, words_of(N), N, &table) == core_ok &&                                \
+               sizeof built == sizeof IT(JOIN(SINES_##kind, number)) &&                                                \
+               memcmp(built, IT(JOIN(SINES_##kind, number)), sizeof built) == 0 &&                                     \
+               IT(_##kind##_##number).sine - IT(JOIN(SINES_##kind, number)) == table.sine - built &&                   \
+               SAME_##kind(IT(_##kind##_##number), table) &&                                                           \
+               frf_dft_init_##init(dft, &config, &IT(_##kind##_##number)) == core_ok;                                  \
+    }
+#define SINES_twiddles          _sines_
+#define SINES_quarter           _quarter_sines_
+#define SAME_twiddles(a, b)     ((a).period_samples == (b).period_samples && (a).cosine - (a).sine == (b).cosine - (b).sine)
+#define SAME_quarter(a, b)                                                                                             \
+    ((a).period_samples == (b).period_samples && (a).quarter_steps == (b).quarter_steps &&                             \
+     (a).sample_steps == (b).sample_steps)
+CHECK(twiddles, q15, q15, int16_t, FRF_TWIDDLE_WORDS)
+CHECK(twiddles, q23, q23, int32_t, FRF_TWIDDLE_WORDS)
+CHECK(twiddles, q31, q31, int32_t, FRF_TWIDDLE_WORDS)
+CHECK(quarter, quarter_q15, q15, int16_t, FRF_QUARTER_WORDS)
+CHECK(quarter, quarter_q23, q23, int32_t, FRF_QUARTER_WORDS)
+CHECK(quarter, quarter_q31, q31, int32_t, FRF_QUARTER_WORDS)
+
+/* A sum over the samples, or over them as 24-bit ones, 256 times as large. */
+static double sum_of(struct frf_dft *dft, int is_q23)
+{
+    static int32_t wide[N];
+    struct frf_period period;
+    if (is_q23) {
+        for (uint32_t i = 0; i < N; ++i) {
+            wide[i] = frames[i] * 256;
+        }
+        frf_dft_add_i24(dft, wide, N);
+    } else {
+        frf_dft_add_i16(dft, frames, N);
+    }
+    return frf_dft_latest(dft, &period) ? (double)frf_period_real(dft, &period, 0, 0) : 0;
+}
 
 static int check(void)
 {
-    static int16_t q15[FRF_TWIDDLE_WORDS(N)];
-    static int32_t q31[FRF_TWIDDLE_WORDS(N)];
-    struct frf_twiddles_q15 table_q15;
-    struct frf_twiddles_q31 table_q31;
-    struct frf_dft_config config = {IT(_bins), K, 1, words, sizeof words / sizeof *words, 0, 0};
     struct frf_dft dft;
-    struct frf_period period;
-    int64_t real;
-    if (frf_twiddles_build_q15(q15, FRF_TWIDDLE_WORDS(N), N, &table_q15) != core_ok ||
-        frf_twiddles_build_q31(q31, FRF_TWIDDLE_WORDS(N), N, &table_q31) != core_ok ||
-        memcmp(q15, IT(_sines_q15), sizeof q15) != 0 || memcmp(q31, IT(_sines_q31), sizeof q31) != 0 ||
-        frf_dft_init_q15(&dft, &config, &IT(_twiddles_q15)) != core_ok) {
+    double sums[6];
+    if (!check_twiddles_q15(&dft)) {
         return 0;
     }
-    frf_dft_add_i16(&dft, frames, N);
-    if (!frf_dft_latest(&dft, &period)) {
+    sums[0] = sum_of(&dft, 0);
+    if (!check_quarter_q15(&dft)) {
         return 0;
     }
-    real = frf_period_real(&dft, &period, 0, 0);
-    if (frf_dft_init_q31(&dft, &config, &IT(_twiddles_q31)) != core_ok) {
+    sums[1] = sum_of(&dft, 0);
+    if (!check_twiddles_q31(&dft)) {
         return 0;
     }
-    frf_dft_add_i16(&dft, frames, N);
-    /* Q31 is Q15 with 16 more bits: the same but for Q15's rounding, half a unit a sample. */
-    return frf_dft_latest(&dft, &period) && real != 0 &&
-           frf_period_real(&dft, &period, 0, 0) / 65536 - real < 32768 * (int64_t)N &&
-           real - frf_period_real(&dft, &period, 0, 0) / 65536 < 32768 * (int64_t)N;
+    sums[2] = sum_of(&dft, 0) / 65536;
+    if (!check_quarter_q31(&dft)) {
+        return 0;
+    }
+    sums[3] = sum_of(&dft, 0) / 65536;
+    if (!check_twiddles_q23(&dft)) {
+        return 0;
+    }
+    sums[4] = sum_of(&dft, 1) / 65536;
+    if (!check_quarter_q23(&dft)) {
+        return 0;
+    }
+    sums[5] = sum_of(&dft, 1) / 65536;
+    for (unsigned i = 1; i < 6; ++i) {
+        /* Apart by the rounding of Q15's factors at most, half a unit a sample. */
+        if (!(sums[i] - sums[0] < 16384.0 * N && sums[0] - sums[i] < 16384.0 * N) || !(sums[0] < 0 || sums[0] > 0)) {
+            return 0;
+        }
+    }
+    return 1;
 }
 #endif
 
@@ -158,7 +207,7 @@ check low -DHAS_BLOCK
 design odd folded odd:4:3996:4 2000
 expect_layout odd 32 32 2
 check odd -DHAS_BLOCK
-design sines q15,q31 linear:100:1000:100 80
+design sines quarter-q31,q15,quarter-q23,q31,q23,quarter-q15 linear:100:1000:100 80
 check sines
 design everything q31,folded,q15 odd:4:800:4 2000
 check everything -DHAS_BLOCK
@@ -176,8 +225,8 @@ refuse() { # refuse STATUS PART_OF_MESSAGE ARGUMENT...
         exit 1
     fi
 }
-refuse 2 "--dft-header: 'block,q16': expected block, folded, q15, q31" none block,q16 linear:100:1000:100 80
-refuse 2 "--dft-header: 'block,': expected block" none block, linear:100:1000:100 80
+refuse 2 "--dft-header: 'block,q16': expected block or folded, q15, q23, q31, quarter-q15" none block,q16 linear:100:1000:100 80
+refuse 2 "--dft-header: 'block,': expected block or folded" none block, linear:100:1000:100 80
 refuse 2 "--dft-header: 'block,folded': expected block or folded, not both" none block,folded linear:100:1000:100 80
 refuse 2 "--dft-header is for a single table" none block octaves:10:1000:10 2000
 refuse 1 "none-dft.h: a period of 50 samples has no blocks: expected 64 to 65536" none block linear:800:3200:800 50

@@ -120,6 +120,18 @@ for page in pages + glob.glob(os.path.join(source, "docs", "**", "*.md"), recurs
             wrong += [f"{page}: no test is called {part}" for part in choice.split("|")
                       if not any(re.search(part, test) for test in tests)]
             checked += 1
+# Every formula has a file that computes it.
+with open(os.path.join(source, "docs", "theory.md"), encoding="utf-8") as file:
+    theory = file.read()
+rows = re.findall(r"^\| (F\d[F\d, ]*) \| (.*) \|$", theory, re.M)
+placed = [number for numbers, _ in rows for number in numbers.split(", ")]
+wrong += [f"theory.md: {number} is computed nowhere" for number in re.findall(r"^\*\*(F\d+)\b", theory, re.M) if number not in placed]
+wrong += [f"theory.md: {path}" for _, paths in rows for path in re.findall(r"`(.*?)`", paths)
+          if not os.path.exists(os.path.join(source, path))]
+# Every benchmark has its place on the page about them.
+with open(os.path.join(source, "docs", "testing.md"), encoding="utf-8") as file:
+    told = file.read()
+wrong += [f"testing.md: no word of ./run bench {name}" for name in benches if name != "NAME" and f"`{name}`" not in told]
 # What the glossary calls a name in C is one.
 sources = subprocess.run(["grep", "-rhow", "[a-z][A-Za-z0-9_]*", "--include=*.[ch]", "lib", "drivers", "sim", "lab"], cwd=source,
                          check=True, capture_output=True, text=True).stdout

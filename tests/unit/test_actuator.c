@@ -135,9 +135,36 @@ static void test_actuator_whole_dead_time_gives_the_reference_of_that_many_sampl
         }
 }
 
+/// The integrals over a substep that sim_torque stands for, against sums over the closed form.
+static void test_actuator_says_where_its_torque_takes_the_motor(void)
+{
+    enum { parts = 4000 };
+    const double delay = 1.15, lag = 0.4; // begins within a substep
+    model.dead_time_s = delay / model.sample_rate_hz;
+    model.torque_lag_s = lag / model.sample_rate_hz;
+    prepare();
+    for (size_t n = 0; n < 20; n++) {
+        sim_actuator_hold(&actuator, reference[n]);
+        for (size_t i = 0; i < sim_substeps; i++) {
+            double mean = sim_actuator_substep(&actuator, &stepper, i), first = 0.0, second = 0.0;
+            for (size_t j = 0; j < parts; j++) {
+                double part = ((double)j + 0.5) / parts, to_end = 1.0 - part;
+                double torque = staircase((double)n + ((double)i + part) / sim_substeps, n, delay, lag) - mean;
+                first += to_end * torque / parts;
+                second += 0.5 * to_end * to_end * torque / parts;
+            }
+            // The sum's error: a step of about 1 Nm within one of the parts.
+            TEST_ASSERT_DOUBLE_WITHIN(1.0 / parts, first, actuator.last.before + actuator.last.after);
+            TEST_ASSERT_DOUBLE_WITHIN(1.0 / parts, second, actuator.last.before);
+            TEST_ASSERT_EQUAL_DOUBLE(mean, actuator.last.mean);
+        }
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_actuator_says_where_its_torque_takes_the_motor);
     RUN_TEST(test_actuator_follows_the_staircase_exactly_for_any_dead_time_and_lag);
     RUN_TEST(test_actuator_without_lag_and_dead_time_gives_the_reference_at_once);
     RUN_TEST(test_actuator_with_lag_starts_from_where_it_was);

@@ -30,6 +30,9 @@ void setUp(void)
 {
     sim_model_default(&truth);
     truth.sensors = (struct sim_sensors){.velocity_noise_rad_per_s = 5e-3, .torque_noise_Nm = 3e-3};
+    // Torque noise is alike at neighbouring bins. The noise of a speed alone is not at the lowest, where it would be
+    // taken for larger than it is, and deviations with it.
+    truth.process_noise_Nm = 0.01;
     truth.motor_inertia_kgm2 = 0.004;
     truth.load_inertia_kgm2 = 0.001;
     truth.viscous_friction_Nms_per_rad = 0.004;
@@ -240,6 +243,42 @@ static void assert_deviations(const char *id, double start, double expected)
     TEST_ASSERT_TRUE_MESSAGE(sum > statistics_chi2_quantile(0.0005, draws), message);
 }
 
+/// A belt with a gap between motor and load, that the given model does not have.
+static void make_loose_belt(void)
+{
+    truth.structure = sim_structure_two_mass;
+    truth.belt_stiffness_Nm_per_rad = 80.0;
+    truth.belt_damping_Nms_per_rad = 0.05;
+    given = truth;
+    int gap = sim_effect_find("backlash");
+    truth.effect_on[gap] = true;
+    truth.effect_parameters[gap][0] = 4e-4;
+}
+
+/// A slope over the jump of a single contact would stop a fit short, or state a tenth of the deviation.
+static void test_fit_of_a_rough_residual_has_one_end_and_one_deviation(void)
+{
+    static const double starts[] = {0.7, 0.9, 0.95, 1.0, 1.05, 1.1, 1.3};
+    const double jump = 4.0, most_off = 3.0, alike = 0.3;
+    double first_cost = 0.0, first_deviation = 0.0;
+    make_loose_belt();
+    int gap = sim_effect_find("backlash");
+    double right = truth.effect_parameters[gap][0];
+    record(6);
+    for (size_t i = 0; i < sizeof starts / sizeof starts[0]; i++) {
+        double value, deviation;
+        hypothesis_init(&hypothesis, &given, false, true);
+        name("backlash", starts[i] * right);
+        TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 8));
+        hypothesis_parameters(&hypothesis, gap, fit.covariance, &value, &deviation);
+        first_cost = i == 0 ? fit.cost : first_cost;
+        first_deviation = i == 0 ? deviation : first_deviation;
+        TEST_ASSERT_DOUBLE_WITHIN(jump, first_cost, fit.cost);
+        TEST_ASSERT_DOUBLE_WITHIN(most_off * deviation, right, value);
+        TEST_ASSERT_DOUBLE_WITHIN(alike * first_deviation, first_deviation, deviation);
+    }
+}
+
 static void test_fit_deviations_are_the_scatter_over_fresh_noise(void)
 {
     assert_deviations("viscous_friction", 0.003, truth.viscous_friction_Nms_per_rad);
@@ -300,14 +339,24 @@ static void test_fit_of_a_hidden_mass_ends_at_the_truth_when_the_noise_follows(v
     TEST_ASSERT_EQUAL_DOUBLE(x, hypothesis.x[0]);
 }
 
+static void test_hidden_mass_cost_below_what_noise_leaves_is_not_believed(void)
+{
+    data.values = 800; // chance: 800 +- 40
+    TEST_ASSERT_EQUAL_DOUBLE(801.0, hidden_mass_credible_cost(&data, 801.0));
+    TEST_ASSERT_EQUAL_DOUBLE(740.0, hidden_mass_credible_cost(&data, 740.0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 800.0 - 1.645 * 40.0, hidden_mass_credible_cost(&data, 600.0));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_hidden_mass_cost_below_what_noise_leaves_is_not_believed);
     RUN_TEST(test_fit_finds_a_friction_that_the_given_model_has_wrong);
     RUN_TEST(test_fit_cost_is_the_sum_of_squares_and_priors);
     RUN_TEST(test_fit_stays_within_its_boxes_and_gives_no_deviation_at_a_wall);
     RUN_TEST(test_fit_never_makes_it_worse);
     RUN_TEST(test_fit_step_with_borrowed_derivatives_is_the_first_step_of_a_fit);
+    RUN_TEST(test_fit_of_a_rough_residual_has_one_end_and_one_deviation);
     RUN_TEST(test_fit_deviations_are_the_scatter_over_fresh_noise);
     RUN_TEST(test_repeat_adds_by_how_much_other_data_give_another_number);
     RUN_TEST(test_fit_of_a_hidden_mass_ends_at_the_truth_when_the_noise_follows);

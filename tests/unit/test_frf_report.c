@@ -95,7 +95,7 @@ static void test_frf_report_counts_lines_beyond_two_std(void)
     double frequency[] = {1.0, 3.0, 5.0, 7.0, 9.5};
     double real[] = {0.019, 0.021, 0.0, 0.0, 0.0};
     double imag[] = {-1.0, -1.0 / 3.0, -1.0 / 5.0, -1.0 / 7.0, 0.0};
-    const struct frf_model_curve curve = {"nominal model", 5, frequency, real, imag, NULL};
+    const struct frf_model_curve curve = {"nominal model", 5, frequency, real, imag, NULL, false};
     const struct frf_report_options options = {
         .known_delay_s = 0.0005, .delay_reason = "half a sample", .curve_count = 1, .curves = &curve};
     write_section(&options);
@@ -106,7 +106,7 @@ static void test_frf_report_counts_lines_beyond_two_std(void)
 
 static void test_frf_report_skips_invalid_lines_in_the_count(void)
 {
-    const struct frf_model_curve curve = {"shifted", lines, frf.frequency_hz, frf.imag, frf.imag, NULL};
+    const struct frf_model_curve curve = {"shifted", lines, frf.frequency_hz, frf.imag, frf.imag, NULL, false};
     const struct frf_report_options options = {.curve_count = 1, .curves = &curve};
     frf.valid[0] = frf.valid[7] = false;
     write_section(&options);
@@ -170,13 +170,22 @@ static void test_frf_report_draws_a_model_with_its_region(void)
     for (size_t k = 0; k < lines; k++) {
         std[k] = 0.02;
     }
-    const struct frf_model_curve curve = {"two masses", lines, frf.frequency_hz, frf.real, frf.imag, std};
+    const struct frf_model_curve curve = {"two masses", lines, frf.frequency_hz, frf.real, frf.imag, std, false};
     const struct frf_report_options options = {.curve_count = 1, .curves = &curve};
     write_section(&options);
     TEST_ASSERT_EQUAL_UINT(2, count_paths("ln"));
     TEST_ASSERT_EQUAL_UINT(1, count_paths("bd"));
     says(">measured<");
     says(">two masses<");
+}
+
+static void test_frf_report_joins_no_lines_of_a_model_simulated_at_them(void)
+{
+    const struct frf_model_curve curve = {"simulated", lines, frf.frequency_hz, frf.real, frf.imag, NULL, true};
+    const struct frf_report_options options = {.curve_count = 1, .curves = &curve};
+    write_section(&options);
+    TEST_ASSERT_EQUAL_UINT(0, count_paths("ln"));
+    says(">simulated<");
 }
 
 /* Without colour a triangle is a path of three sides, a square one of four, and a dot has no length. */
@@ -338,7 +347,8 @@ static void test_frf_report_of_10000_lines_stays_light(void)
         frf.coherence[k] = 1.0 - 0.5 * noise;
         frf.valid[k] = true;
     }
-    const struct frf_model_curve curve = {"model", many_lines, frf.frequency_hz, frf.noise_std, frf.imag, frf.std};
+    const struct frf_model_curve curve = {"model", many_lines, frf.frequency_hz, frf.noise_std, frf.imag,
+                                          frf.std, false};
     const struct frf_report_options options = {.curve_count = 1, .curves = &curve};
     write_section(&options);
     TEST_ASSERT_LESS_THAN_UINT(page_bytes_max, strlen(text));
@@ -356,6 +366,7 @@ int main(void)
     RUN_TEST(test_frf_report_joins_no_measured_lines);
     RUN_TEST(test_frf_report_calls_a_model_a_model);
     RUN_TEST(test_frf_report_draws_a_model_with_its_region);
+    RUN_TEST(test_frf_report_joins_no_lines_of_a_model_simulated_at_them);
     RUN_TEST(test_frf_report_overlays_runs_in_shapes_of_their_own);
     RUN_TEST(test_frf_report_holds_a_saved_response_against_this_one);
     RUN_TEST(test_frf_report_takes_the_known_delay_of_a_held_input);

@@ -173,7 +173,8 @@ static void test_hypothesis_naming_starts_at_the_values_and_opens_the_box(void)
             }
             for (size_t i = 0; i < hypothesis.count; i++)
                 if (hypothesis.coordinates[i].effect == e) {
-                    TEST_ASSERT_EQUAL_DOUBLE(0.0, hypothesis.coordinates[i].weight);
+                    bool whole = effect->parameters[hypothesis.coordinates[i].parameter].near_whole > 0.0;
+                    TEST_ASSERT_EQUAL_INT(whole, hypothesis.coordinates[i].weight > 0.0);
                     own++;
                 }
             TEST_ASSERT_EQUAL_UINT(effect->parameter_count, own);
@@ -416,9 +417,26 @@ static void test_hypothesis_leaves_the_inertia_of_a_rigid_body_to_a_free_gain(vo
     TEST_ASSERT_FALSE(hypothesis_may_name(&hypothesis, inertia));
 }
 
+/// What the speed carries of an encoder's error: all or nothing, and a fit that says neither pays for it.
+static void test_hypothesis_keeps_what_is_0_or_1_by_construction_near_it(void)
+{
+    int effect = effect_of("encoder_eccentricity");
+    hypothesis.sensors_seen = true;
+    for (int whole = 0; whole < 2; whole++) {
+        struct hypothesis named = hypothesis;
+        hypothesis_name(&named, effect, (double[]){1e-3, 0.0, whole == 0 ? 0.1 : 1.0});
+        const struct coordinate *c = named.coordinates;
+        while (c->effect != effect || c->parameter != 2)
+            TEST_ASSERT_TRUE(++c < named.coordinates + named.count);
+        TEST_ASSERT_DOUBLE_WITHIN(rounding, whole, c->centre * c->unit);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0 / 0.05, c->weight / c->unit);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_hypothesis_keeps_what_is_0_or_1_by_construction_near_it);
     RUN_TEST(test_hypothesis_starts_as_the_given_model_with_its_numbers_in_narrow_boxes);
     RUN_TEST(test_hypothesis_at_the_walls_gives_values_at_the_walls);
     RUN_TEST(test_hypothesis_without_reference_leaves_the_actuator_alone);

@@ -40,6 +40,8 @@ static void test_judge_size_of_a_ripple_is_its_amplitude(void)
     TEST_ASSERT_FALSE(is_vague("cogging", (double[]){0.01, 12.0, 0.3}, (double[]){0.001, 0.001, 0.1}));
     TEST_ASSERT_FALSE(is_vague("stribeck_friction", (double[]){5.0, 9.28}, (double[]){1.0, 38.0}));
     TEST_ASSERT_TRUE(is_vague("stribeck_friction", (double[]){5.0, 9.28}, (double[]){4.0, 38.0}));
+    // How friction builds up is certain of a distance that is not.
+    TEST_ASSERT_TRUE(is_vague("presliding", (double[]){1e-3, 0.9}, (double[]){1e-3, 0.1}));
 }
 
 static void test_judge_noise_larger_than_the_torque_lets_no_name_stand(void)

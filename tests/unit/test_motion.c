@@ -134,6 +134,10 @@ static void test_motion_of_both_is_less_noisy_than_either(void)
         double speed = (1.0 - low) * sigma_v, derivative = low * w * sigma_p * rate_hz;
         expected += (speed * speed + derivative * derivative) / 2000.0;
     }
+    // Kalman gain of a position that walks by sigma_v / rate per sample, from its own noise: P = K R, P^2 = Q (P + R).
+    double q = sigma_v / rate_hz * (sigma_v / rate_hz), r = sigma_p * sigma_p, gain = out.position_gain;
+    double predicted = gain * r / (1.0 - gain);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1 * q, q, predicted * predicted / (predicted + r));
     TEST_ASSERT_TRUE(fused < 0.98 * sigma_v && fused < 0.2 * from_position);
     TEST_ASSERT_DOUBLE_WITHIN(0.05 * sqrt(expected), sqrt(expected), fused);
     TEST_ASSERT_NULL(strstr(text, "left out"));

@@ -2,6 +2,7 @@
 /// A model's prediction of a run that the same model made, without noise, leaves nothing but rounding.
 #include "lab/diagnose/predict.h"
 
+#include "lab/numeric/statistics.h"
 #include "sim/belt_drive.h"
 #include "unity.h"
 
@@ -347,6 +348,41 @@ static void test_predict_scales_by_the_given_inertia(void)
         TEST_ASSERT_DOUBLE_WITHIN(1e-15, 2.0 * mechanics[n], twice[n]);
 }
 
+static double rms_of_mechanics(void)
+{
+    double sum = 0.0;
+    for (size_t n = 0; n < period; n++)
+        sum += mechanics[n] * mechanics[n] / period;
+    return sqrt(sum);
+}
+
+static void test_predict_lets_a_belt_feel_less_of_a_position_s_noise_beside_a_good_speed(void)
+{
+    const double noise_rad = 1e-4, gain = 0.1;
+    struct random random;
+    two_masses();
+    run_drive();
+    random_seed(&random, 3);
+    for (size_t n = 0; n < rows; n++)
+        position[n] += noise_rad * random_normal(&random);
+    predict(&model, &last_period, true, 0.005, mechanics, NULL);
+    double all_of_it = rms_of_mechanics();
+    last_period.position_gain = gain;
+    predict(&model, &last_period, true, 0.005, mechanics, NULL);
+    // What is left of white noise behind x += gain (measured - x).
+    double expected = sqrt(gain / (2.0 - gain));
+    TEST_ASSERT_DOUBLE_WITHIN(0.1 * expected, expected, rms_of_mechanics() / all_of_it);
+}
+
+static void test_predict_with_a_position_gain_leaves_nothing_of_two_masses(void)
+{
+    two_masses();
+    run_drive();
+    last_period.position_gain = 0.05;
+    predict(&model, &last_period, true, 0.005, mechanics, actuator);
+    assert_all_zero(period, fmax(allowed_Nm, 100.0 * rounding));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -367,5 +403,7 @@ int main(void)
     RUN_TEST(test_predict_gives_missing_dead_time_to_the_actuator_channel);
     RUN_TEST(test_predict_from_measured_torque_alone_is_right_where_torque_is_slow);
     RUN_TEST(test_predict_scales_by_the_given_inertia);
+    RUN_TEST(test_predict_lets_a_belt_feel_less_of_a_position_s_noise_beside_a_good_speed);
+    RUN_TEST(test_predict_with_a_position_gain_leaves_nothing_of_two_masses);
     return UNITY_END();
 }

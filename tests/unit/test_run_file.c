@@ -135,7 +135,8 @@ static void test_run_read_refuses_what_is_no_table(void)
     refuse("", "run.csv: the file is empty: a row of column names was expected");
     refuse("# sample_rate_hz: 1\n", "run.csv:2: the file ends without a row of column names");
     refuse("torque_Nm\n", "run.csv:2: the file ends without a row of numbers");
-    refuse("0,1\n2,3\n", "run.csv:1: '0' is a number, the row of column names was expected first");
+    refuse("0,1\n2,3\n", "run.csv:1: '0' is a number, the row of column names was expected first"
+                         "; 'servoscope convert' makes a run of other programs' tables");
     refuse("time_s;torque_Nm\n0,0;1,5\n", "run.csv:1: columns are separated by semicolons: commas were expected, and a "
                                           "point as decimal mark; 'servoscope "
                                           "convert' makes such a file of it");
@@ -284,7 +285,9 @@ static void test_run_read_refuses_a_bad_map(void)
         {"torque_Nm=a*x", error_usage, "--map: 'torque_Nm=a*x': a number other than 0 was expected behind the '*'"},
         {"torque_Nm=a,torque_Nm=b", error_usage, "--map: 'torque_Nm=b': the name is mapped twice"},
         {"torque_Nm=c", error_refused, "run.csv:2: --map: there is no column 'c', only: a, b"},
-        {"torque_Nm=b", error_refused, "run.csv:3: b: 'x' is not a number"},
+        {"torque_Nm=b", error_refused,
+         "run.csv:3: b: 'x' is not a number"
+         "; 'servoscope convert' makes a run of other programs' tables"},
         {"torque_Nm=a*1e308", error_refused, "run.csv:3: torque_Nm: too large for a double once scaled by 1e+308"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {

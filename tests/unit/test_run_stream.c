@@ -78,6 +78,34 @@ static void fill(size_t rows)
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, run_stream_fill(stream, rows, &error), error.message);
 }
 
+static void test_run_stream_says_how_much_of_the_file_it_has_read(void)
+{
+    enum { rows = 20000 }; // some chunks of the reader
+    char *text = make_text(rows);
+    open_stream(scratch_text("run.csv", text), &mapped);
+    free(text);
+    double before = run_stream_share(stream);
+    TEST_ASSERT_TRUE(before > 0.0 && before < 0.5);
+    while (!run_stream_ended(stream)) {
+        run_stream_forget(stream);
+        fill(1000);
+        TEST_ASSERT_TRUE(run_stream_share(stream) >= before);
+        before = run_stream_share(stream);
+    }
+    TEST_ASSERT_TRUE(before == 1.0);
+}
+
+static void test_run_stream_tells_who_reads_a_table_of_another_program(void)
+{
+    const char *path = scratch_text("log.csv", "t [ms];M [Nm]\n0;1,5\n1;2,5\n");
+    TEST_ASSERT_EQUAL_INT(error_refused, run_stream_open(path, NULL, &stream, &error));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(error.message, "'servoscope convert'"), error.message);
+    path = scratch_text("log.csv", "torque_Nm,velocity_rad_per_s\n0,x\n");
+    TEST_ASSERT_EQUAL_INT(0, run_stream_open(path, NULL, &stream, &error));
+    TEST_ASSERT_EQUAL_INT(error_refused, run_stream_fill(stream, 10, &error));
+    TEST_ASSERT_NULL_MESSAGE(strstr(error.message, "'servoscope convert'"), error.message);
+}
+
 static void test_run_stream_gives_what_run_read_gives_in_pieces_of_any_size(void)
 {
     enum { rows = 3000 };
@@ -302,6 +330,8 @@ int main(void)
 {
     scratch_open();
     UNITY_BEGIN();
+    RUN_TEST(test_run_stream_says_how_much_of_the_file_it_has_read);
+    RUN_TEST(test_run_stream_tells_who_reads_a_table_of_another_program);
     RUN_TEST(test_run_stream_gives_what_run_read_gives_in_pieces_of_any_size);
     RUN_TEST(test_run_stream_splits_off_a_leading_run_that_stands_by_itself);
     RUN_TEST(test_run_stream_refuses_in_pieces_what_run_read_refuses);

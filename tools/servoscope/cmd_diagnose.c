@@ -179,11 +179,11 @@ static void print_causes(const struct diagnosis *self, const char *heading, cons
         print_heading(heading);
     }
     for (size_t i = 0; i < count; i++) {
-        char name[wording_short], unseen[wording_size];
+        char name[wording_short], evidence[wording_short], unseen[wording_size];
+        wording_evidence(causes[i].evidence, evidence);
         wording_effect(causes[i].effect, name);
         wording_unseen(self, &causes[i], unseen);
-        printf("  %s (evidence %.1f nats): %s%s%s\n", name, causes[i].evidence, causes[i].says, unseen[0] ? " " : "",
-               unseen);
+        printf("  %s (evidence %s): %s%s%s\n", name, evidence, causes[i].says, unseen[0] ? " " : "", unseen);
     }
 }
 

@@ -249,16 +249,13 @@ static int say_outcome(const struct estimating_options *arguments, const struct 
 }
 
 static int write_and_report(const struct estimating_options *arguments, const struct estimating_outcome *outcome,
-                            const struct command_context *context, struct error *out_error)
+                            const struct comparing *compared, const struct command_context *context,
+                            struct error *out_error)
 {
-    struct comparing compared = {0};
-    const struct estimating_page_item item = {outcome, &arguments->runs, arguments->out, &compared};
-    int status = comparing_read(&arguments->compare, &compared, out_error);
-    status = status ? status : comparing_check(&compared, &outcome->frf, arguments->out, out_error);
+    const struct estimating_page_item item = {outcome, &arguments->runs, arguments->out, compared};
+    int status = comparing_check(compared, &outcome->frf, arguments->out, out_error);
     status = status ? status : write_files(arguments, &item, 1, out_error);
-    status = status ? status : say_outcome(arguments, outcome, &compared, context, out_error);
-    comparing_free(&compared);
-    return status;
+    return status ? status : say_outcome(arguments, outcome, compared, context, out_error);
 }
 
 /// Passes on why runs cannot be taken together: "run 2" becomes "run 2 (other.csv)".

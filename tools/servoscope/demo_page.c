@@ -94,8 +94,8 @@ static void write_sections(FILE *stream, const struct demo_page *self, const str
                            const struct frf *extended)
 {
     const struct frf_model_curve curves[] = {
-        {"nominal model", nominal->count, nominal->frequency_hz, nominal->real, nominal->imag, NULL},
-        {"extended model", extended->count, extended->frequency_hz, extended->real, extended->imag, NULL},
+        {"nominal model", nominal->count, nominal->frequency_hz, nominal->real, nominal->imag, NULL, true},
+        {"extended model", extended->count, extended->frequency_hz, extended->real, extended->imag, NULL, true},
     };
     const struct frf_report_options options = {
         .known_delay_s = 0.5 / self->runs[0].sample_rate_hz,

@@ -15,7 +15,7 @@ struct design_options {
     const char *out;
     const char *report;
     const char *dft_header; ///< kinds, as dft_header_parse() reads them
-    const char *method; ///< NULL: the designer's own choice
+    const char *method;     ///< NULL: the designer's own choice
     const char *keep;
     const char *grid;      ///< "continuous"
     const char *start;     ///< "paper"

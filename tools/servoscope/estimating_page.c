@@ -114,8 +114,8 @@ static bool take_model(const struct estimating_page_item *item, struct section *
     }
     snprintf(io->curve_name, name_size, "model, order %zu over %zu", found->model.structure.numerator_order,
              found->model.structure.denominator_order);
-    io->curve = (struct frf_model_curve){io->curve_name, io->grid.count, io->grid.frequency_hz,
-                                         io->grid.real,  io->grid.imag,  io->grid.std};
+    io->curve = (struct frf_model_curve){
+        io->curve_name, io->grid.count, io->grid.frequency_hz, io->grid.real, io->grid.imag, io->grid.std, false};
     io->options.curves = &io->curve;
     io->options.curve_count = 1;
     return true;
