@@ -249,8 +249,7 @@ static bool inject(struct inproc_bus *self, const struct inproc_fault *fault, st
         leave_bus(self, fault);
         return false;
     case inproc_fault_kinds:
-        acts = false;
-        break;
+        return false;
     }
     self->counters.injected[fault->kind] += acts;
     return withheld;

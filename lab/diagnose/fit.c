@@ -325,8 +325,8 @@ static double take_part(struct fit *self, const struct fit_data *data, struct hy
     return 0.0;
 }
 
-/// Goes on from where a fit ended whose residual is rough: derivatives are secants then, so that neither jumps nor kinks
-/// of single instants stop the fit or pass for information.
+/// Goes on from where a fit ended whose residual is rough: derivatives are secants then, so that neither jumps nor
+/// kinks of single instants stop the fit or pass for information.
 static bool polish(struct fit *self, const struct fit_data *data, struct hypothesis *io_hypothesis)
 {
     enum { most = 4 };
@@ -348,8 +348,8 @@ static bool polish(struct fit *self, const struct fit_data *data, struct hypothe
     return good;
 }
 
-/// A belt that goes slack and tight does so at instants that jump with every number of the model. Where the noise follows
-/// the model, too, derivatives cost ten times as much and stay as they are.
+/// A belt that goes slack and tight does so at instants that jump with every number of the model. Where the noise
+/// follows the model, too, derivatives cost ten times as much and stay as they are.
 static bool is_rough(const struct fit_data *data, const struct hypothesis *h)
 {
     struct sim_model model;

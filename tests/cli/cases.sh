@@ -36,6 +36,6 @@ while read -r name; do
     python3 -c 'import sys, xml.etree.ElementTree as tree; tree.parse(sys.argv[1])' "$folder/$name" || fail "figure $name"
 done < <(sed -n 's/^!\[.*](\(.*\.svg\))$/\1/p' "$page")
 [ "$(grep -c '^!\[' "$page")" -ge 8 ] || fail "figures: $(grep '^!\[' "$page")"
-[ "$(cat "$folder"/cogging* | wc -c)" -lt 200000 ] || fail "the page is $(cat "$folder"/cogging* | wc -c) bytes"
+[ "$(cat "$folder"/cogging* | wc -c)" -lt 250000 ] || fail "the page is $(cat "$folder"/cogging* | wc -c) bytes"
 
 [ "$failures" -eq 0 ]
