@@ -396,8 +396,13 @@ void truth_kind_refit(enum truth_kind kind, const struct truth_plant_spec *truth
         io_plant->load_inertia_kgm2 = moved(io_plant->load_inertia_kgm2, truth->load_inertia_kgm2, of_load);
     } else if (kind == truth_kind_torque_lag) {
         io_plant->torque_lag_s = moved(io_plant->torque_lag_s, truth->torque_lag_s, usual);
+        // Below its corner a lag is a delay, and the given delay may be off as well.
+        double rest = truth->torque_lag_s - io_plant->torque_lag_s;
+        io_plant->dead_time_s = moved(io_plant->dead_time_s, io_plant->dead_time_s + rest, usual);
     } else if (kind == truth_kind_dead_time) {
         io_plant->dead_time_s = moved(io_plant->dead_time_s, truth->dead_time_s, usual);
+        double rest = truth->dead_time_s - io_plant->dead_time_s;
+        io_plant->torque_lag_s = moved(io_plant->torque_lag_s, io_plant->torque_lag_s + rest, usual);
     } else if (kind == truth_kind_position_dependent_stiffness) { // about its middle, where the belt may be off anyhow
         double there = 1.0 + truth->stiffness_slope_per_rad * truth->coulomb_origin_rad;
         io_plant->belt_stiffness_Nm_per_rad =
