@@ -294,8 +294,14 @@ static enum blackbox_group one_gap(const struct blackbox *box, const struct fit_
 /// black box leaves of it on return.
 static void judge_mean(const struct bench *b, double validation_rms, bool worse, double *io_rest, struct judgement *j)
 {
-    // Beside a given model a right answer leaves noise. Without one, half as much again is what a machine is like.
-    const double too_much = b->hypothesis->inertia_free ? 1.5 : 1.25,
+    bool named = false;
+    for (int e = 0; sim_effects[e]; e++)
+        named = named || b->hypothesis->named[e];
+    // Beside a given model a right answer leaves noise, and that nothing is wrong is the boldest answer of all. Without
+    // one, half as much again is what a machine is like.
+    const double too_much = b->hypothesis->inertia_free ? 1.5
+                            : named                     ? 1.25
+                                                        : 1.15,
                  visible = 1.12;    // a third of the noise's amplitude
     const double seen_again = 1.03; // on data the fit has not seen: chance does not come twice
     double left, values = (double)b->data->values, columns = (double)b->box->columns;

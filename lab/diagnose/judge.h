@@ -28,8 +28,8 @@ struct judge_validation {
 /// Judges a finished search.
 /// Unexplained: the black box gains more than chance allows (its expected gain plus twelve standard deviations) and
 /// more than a third of the noise in amplitude, or one group of it does as well as three names, or the residual on fit
-/// or validation data is a quarter larger than the noise (half as large again without a given model), or periods differ
-/// beyond chance.
+/// or validation data is a quarter larger than the noise (half as large again without a given model, a seventh where
+/// nothing is named), or periods differ beyond chance.
 /// A name stands if it explains a visible share of the torque and, where something stays unexplained, far more than
 /// what stays and more than the black box can do without it.
 /// Errors: false if memory is short.

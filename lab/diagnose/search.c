@@ -10,6 +10,8 @@
 #include <string.h>
 
 enum { refine_iterations = 8, refined_candidates = 3 };
+/// Misfit per value that is nowhere near noise: likelihoods are not worth their digits there.
+static const double far_from_noise = 3.0;
 
 double search_threshold(const struct fit_data *data, int effect)
 {
@@ -152,10 +154,10 @@ static size_t scan_all(const struct fit_data *data, const struct sim_coverage *c
 static bool is_preferred(const struct fit_data *data, const struct scan_candidate *candidate, double margin,
                          const struct scan_candidate *best, double best_margin)
 {
-    const double far = 3.0, alike = 0.7;
+    const double alike = 0.7;
     if (!best)
         return margin > 0.0;
-    double least = far * (double)data->values;
+    double least = far_from_noise * (double)data->values;
     size_t parameters = sim_effects[candidate->effect]->parameter_count,
            best_parameters = sim_effects[best->effect]->parameter_count;
     if (parameters != best_parameters && fmin(candidate->cost, best->cost) > least)
@@ -318,10 +320,9 @@ static bool find_one_for(const struct fit_data *data, const struct sim_coverage 
 static bool merge_two(const struct fit_data *data, const struct sim_coverage *coverage, struct hypothesis *io_h,
                       struct fit *io_fit)
 {
-    const double far = 3.0;
     struct fit base;
     bool merged = false;
-    if (io_fit->cost > far * (double)data->values || !fit_init(&base, data))
+    if (io_fit->cost > far_from_noise * (double)data->values || !fit_init(&base, data))
         return false;
     for (int a = 0; sim_effects[a] && !merged; a++)
         for (int b = a + 1; io_h->named[a] && sim_effects[b] && !merged; b++) {
@@ -339,12 +340,16 @@ static bool merge_two(const struct fit_data *data, const struct sim_coverage *co
     return merged;
 }
 
-static size_t named_count(const struct hypothesis *h)
+/// Whether one more name may be tried. Where several leave what is nowhere near noise the cause is not in the
+/// catalogue, and a further one would only describe more of its consequences.
+static bool has_room(const struct fit_data *data, const struct search_options *options, const struct hypothesis *h,
+                     const struct fit *fit)
 {
+    const size_t several = 4;
     size_t count = 0;
     for (int e = 0; sim_effects[e]; e++)
         count += h->named[e];
-    return count;
+    return count < options->causes_max && (count < several || !(fit->cost > far_from_noise * (double)data->values));
 }
 
 bool search_run(const struct fit_data *data, const struct sim_coverage *coverage, const struct search_options *options,
@@ -356,7 +361,7 @@ bool search_run(const struct fit_data *data, const struct sim_coverage *coverage
     drop_unneeded(data, io_hypothesis, io_fit);
     if (options->progress && !options->progress(options->user, "searching"))
         return true;
-    if (named_count(io_hypothesis) < options->causes_max && add_best(data, coverage, io_hypothesis, io_fit)) {
+    if (has_room(data, options, io_hypothesis, io_fit) && add_best(data, coverage, io_hypothesis, io_fit)) {
         place_named_again(data, coverage, io_hypothesis, io_fit);
         drop_unneeded(data, io_hypothesis, io_fit);
     } else if (merge_two(data, coverage, io_hypothesis, io_fit)) {
