@@ -274,6 +274,20 @@ static double *parameter_place(const struct coordinate *c, struct sim_model *mod
     return &model->effect_parameters[c->effect][c->parameter];
 }
 
+/// A logarithm and back may end a few digits beyond the wall that a coordinate stands at; a model file would refuse it.
+static double off_the_wall(const struct hypothesis *self, const struct coordinate *c, double value)
+{
+    const double rounding = 1e-9;
+    if (c->effect < 0)
+        return value;
+    const struct sim_parameter *p = &sim_effects[c->effect]->parameters[c->parameter];
+    double low = self->given->linear ? p->linear_minimum : p->minimum,
+           high = self->given->linear ? p->linear_maximum : p->maximum;
+    if (value > high && value <= high + rounding * fabs(high))
+        return high;
+    return value < low && value >= low - rounding * fabs(low) ? low : value;
+}
+
 void hypothesis_model(const struct hypothesis *self, const double *x, struct sim_model *out_model)
 {
     if (!x)
@@ -281,7 +295,7 @@ void hypothesis_model(const struct hypothesis *self, const double *x, struct sim
     *out_model = self->engaged;
     for (size_t i = 0; i < self->count; i++) {
         const struct coordinate *c = &self->coordinates[i];
-        double value = c->unit * (c->scale == coordinate_logarithmic ? exp(x[i]) : x[i]);
+        double value = off_the_wall(self, c, c->unit * (c->scale == coordinate_logarithmic ? exp(x[i]) : x[i]));
         if (c->scale == coordinate_sine)
             continue; // set together with its cosine part
         if (c->scale == coordinate_cosine) {

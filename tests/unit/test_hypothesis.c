@@ -433,12 +433,35 @@ static void test_hypothesis_keeps_what_is_0_or_1_by_construction_near_it(void)
     }
 }
 
+/// exp(log 3) is more than 3, which a model file would refuse.
+static void test_hypothesis_a_number_at_its_wall_is_within_its_bounds_to_the_last_digit(void)
+{
+    int effect = effect_of("presliding");
+    double values[sim_effect_parameters_max];
+    scan_values(effect, values);
+    hypothesis_name(&hypothesis, effect, values);
+    for (size_t i = 0; i < hypothesis.count; i++) {
+        const struct coordinate *c = &hypothesis.coordinates[i];
+        if (c->effect != effect)
+            continue;
+        const struct sim_parameter *p = &sim_effects[effect]->parameters[c->parameter];
+        for (int side = 0; side < 2; side++) {
+            struct sim_model model;
+            hypothesis.x[i] = side ? c->upper : c->lower;
+            hypothesis_model(&hypothesis, NULL, &model);
+            double value = model.effect_parameters[effect][c->parameter];
+            TEST_ASSERT_TRUE_MESSAGE(value >= p->minimum && value <= p->maximum, p->name);
+        }
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_hypothesis_keeps_what_is_0_or_1_by_construction_near_it);
     RUN_TEST(test_hypothesis_starts_as_the_given_model_with_its_numbers_in_narrow_boxes);
     RUN_TEST(test_hypothesis_at_the_walls_gives_values_at_the_walls);
+    RUN_TEST(test_hypothesis_a_number_at_its_wall_is_within_its_bounds_to_the_last_digit);
     RUN_TEST(test_hypothesis_without_reference_leaves_the_actuator_alone);
     RUN_TEST(test_hypothesis_of_no_given_model_frees_the_inertia_and_does_not_name_it);
     RUN_TEST(test_hypothesis_naming_starts_at_the_values_and_opens_the_box);
