@@ -161,6 +161,9 @@ struct sim_effect {
                  double *out_parameters);
     /// Whether a recording can show the effect with these parameters; if not, says why in one clause.
     bool (*testable)(const double *parameters, const struct sim_coverage *coverage, char *out_why, size_t size);
+    /// NULL, or whether the effect with these parameters is how a drive is made anyway, where a model says it more
+    /// simply: it moves with a fit, and belongs into a model, but is no cause to be named.
+    bool (*detail)(const double *parameters, bool linear);
     /// NULL, or whether part of the effect's usual range cannot show in a recording; if so, says which and why in one
     /// clause.
     bool (*blind)(const struct sim_coverage *coverage, char *out_why, size_t size);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/diagnose/diagnosis.h"
 
+#include "lab/diagnose/alike.h"
 #include "lab/diagnose/blackbox.h"
 #include "lab/diagnose/cause_gain.h"
 #include "lab/diagnose/gain.h"
@@ -51,34 +52,6 @@ static void work_free(struct work *w)
     fit_free(&w->fit);
 }
 
-static int check_alike(const struct run *run, const struct recording *r, const struct run *first_run,
-                       const struct recording *first, struct error *out_error)
-{
-    bool reference = r->block.torque_ref != NULL, first_reference = first->block.torque_ref != NULL;
-    if ((r->input_unit == NULL) != (first->input_unit == NULL) ||
-        (r->input_unit && strcmp(r->input_unit, first->input_unit) != 0))
-        return error_set(out_error, error_refused, "%s: the input is in %s; %s: in %s: all runs have to be alike",
-                         run->path, r->input_unit ? r->input_unit : "Nm or N", first_run->path,
-                         first->input_unit ? first->input_unit : "Nm or N");
-    if (r->rate_hz == first->rate_hz && r->linear == first->linear && reference == first_reference)
-        return 0;
-    return error_set(out_error, error_refused,
-                     "%s: %g Hz, %s, %s torque reference; %s: %g Hz, %s, %s: all runs have to be alike", run->path,
-                     r->rate_hz, r->linear ? "linear" : "rotary", reference ? "with" : "without", first_run->path,
-                     first->rate_hz, first->linear ? "linear" : "rotary", first_reference ? "with" : "without");
-}
-
-/// Gives a run the first one's rate if clocks and time stamps may differ by as much; true if that is worth saying.
-static bool share_rate(const struct run *first, struct run *io_run)
-{
-    const double near = 1e-3, rounding = 1e-6;
-    double off = fabs(io_run->sample_rate_hz / first->sample_rate_hz - 1.0);
-    if (!(off <= near))
-        return false;
-    io_run->sample_rate_hz = first->sample_rate_hz;
-    return off > rounding;
-}
-
 /// Recording number i: fit runs, then validation runs, of which the only one may be the end of the first fit run.
 static int prepare_one(const struct diagnosis_request *request, struct work *w, bool held_back, size_t i,
                        struct error *out_error)
@@ -87,7 +60,7 @@ static int prepare_one(const struct diagnosis_request *request, struct work *w, 
     if (held_back && (i == 0 || i == w->fit_count))
         run = i == 0 ? &w->parts.fitted : &w->parts.judged;
     struct run alike = *run;
-    bool one_rate = share_rate(&request->fit[0], &alike);
+    bool one_rate = alike_share_rate(&request->fit[0], &alike);
     int status = recording_prepare(&alike, &w->recordings[i], out_error);
     if (status != 0)
         return status;
@@ -96,7 +69,7 @@ static int prepare_one(const struct diagnosis_request *request, struct work *w, 
                      run->path, run->sample_rate_hz, alike.sample_rate_hz);
     if (held_back && i == w->fit_count)
         recording_begin(&w->recordings[i], (double)w->parts.from / run->sample_rate_hz);
-    return check_alike(run, &w->recordings[i], &request->fit[0], &w->recordings[0], out_error);
+    return alike_check(run, &w->recordings[i], &request->fit[0], &w->recordings[0], out_error);
 }
 
 static int prepare_recordings(const struct diagnosis_request *request, struct work *w, struct diagnosis *d,
@@ -610,6 +583,13 @@ static void list_causes(const struct work *w, struct diagnosis *d, const struct 
     for (int e = 0; sim_effects[e]; e++) {
         if (!h->named[e])
             continue;
+        if (hypothesis_is_detail(h, e)) {
+            struct diagnosis_cause detail;
+            describe_cause(w, d, h, e, &detail);
+            wording_detail(&detail, &d->oddities);
+            d->detail_count++;
+            continue;
+        }
         bool stands = judgement->stands[e];
         size_t *count = stands ? &d->cause_count : &d->candidate_count;
         struct diagnosis_cause *list = stands ? d->causes : d->candidates;

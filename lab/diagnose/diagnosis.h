@@ -79,10 +79,11 @@ struct diagnosis {
     const char *input_unit;              ///< "A", "V", or NULL: a torque or a force
     double input_gain;                   ///< torque or force per unit of the input
     double input_gain_deviation;         ///< its standard deviation, 0 where it was not estimated
-    struct oddities oddities;            ///< about the recordings, before any model
+    struct oddities oddities;            ///< about the recordings, and details that no model of the kind given has
     struct sim_model given, refitted_model, extended_model;
     struct model_deviations deviations; ///< of extended_model
     size_t cause_count, candidate_count, tie_count, untestable_count;
+    size_t detail_count; ///< of what the extended model has beside, without being a cause; the oddities say it
     struct diagnosis_cause causes[diagnosis_causes_max], candidates[diagnosis_causes_max];
     struct diagnosis_tie ties[diagnosis_ties_max];
     struct diagnosis_untestable untestable[sim_effects_max];

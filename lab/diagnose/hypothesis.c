@@ -339,3 +339,20 @@ void hypothesis_parameters(const struct hypothesis *self, int effect, const doub
         }
     }
 }
+
+bool hypothesis_is_detail(const struct hypothesis *self, int effect)
+{
+    double values[sim_effect_parameters_max] = {0}, unused[sim_effect_parameters_max];
+    if (!self->named[effect] || !sim_effects[effect]->detail)
+        return false;
+    hypothesis_parameters(self, effect, NULL, values, unused);
+    return sim_effects[effect]->detail(values, self->given->linear);
+}
+
+size_t hypothesis_claims(const struct hypothesis *self)
+{
+    size_t count = 0;
+    for (int e = 0; sim_effects[e]; e++)
+        count += self->named[e] && !hypothesis_is_detail(self, e);
+    return count;
+}

@@ -50,6 +50,12 @@ void hypothesis_init(struct hypothesis *self, const struct sim_model *given, boo
 /// Whether an effect may be added at all (not named yet, applicable, room left).
 bool hypothesis_may_name(const struct hypothesis *self, int effect);
 
+/// Whether a named effect is no more than a detail of how the given model is made: fitted, but no claim.
+bool hypothesis_is_detail(const struct hypothesis *self, int effect);
+
+/// Named effects that are claims.
+size_t hypothesis_claims(const struct hypothesis *self);
+
 /// Names an effect, its parameters starting at `values`.
 void hypothesis_name(struct hypothesis *self, int effect, const double *values);
 

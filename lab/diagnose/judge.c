@@ -198,6 +198,11 @@ static bool is_large_enough(const struct bench *b, int effect)
            sensor_share(b->data, b->coverage, b->hypothesis, effect) >= least_sensor_share;
 }
 
+static bool is_claimed(const struct bench *b, int effect)
+{
+    return b->hypothesis->named[effect] && !hypothesis_is_detail(b->hypothesis, effect);
+}
+
 static bool is_in_time(const struct bench *b, int effect)
 {
     return sim_effects[effect]->in_time && b->data->contrasts > 0;
@@ -209,7 +214,7 @@ static bool judge_in_time(const struct bench *b, struct judgement *j)
     const double dominance = 20.0;
     bool all = true;
     for (int e = 0; sim_effects[e]; e++) {
-        if (!b->hypothesis->named[e] || !is_in_time(b, e))
+        if (!is_claimed(b, e) || !is_in_time(b, e))
             continue;
         j->stands[e] = is_large_enough(b, e) &&
                        (!(j->leftover_in_time > 0.0) ||
@@ -229,7 +234,7 @@ static void judge_others(const struct bench *b, const struct structure *over_tim
     const double part_of_rest = b->hypothesis->inertia_free ? 0.3 : 10.0,
                  rest = fmax(0.5 * (b->fit->cost - (double)b->data->values), 0.0);
     for (int e = 0; sim_effects[e]; e++) {
-        if (!b->hypothesis->named[e] || is_in_time(b, e))
+        if (!is_claimed(b, e) || is_in_time(b, e))
             continue;
         bool stands = is_large_enough(b, e);
         if (stands && j->of_mean) {
@@ -268,10 +273,7 @@ static enum blackbox_group one_gap(const struct blackbox *box, const struct fit_
 {
     struct fit trial;
     struct hypothesis bare;
-    size_t names = 0;
-    for (int e = 0; sim_effects[e]; e++)
-        names += h->named[e];
-    const size_t patchwork = 3;
+    const size_t names = hypothesis_claims(h), patchwork = 3;
     if (names < patchwork || !fit_init(&trial, data))
         return blackbox_groups;
     hypothesis_init(&bare, h->given, h->inertia_free, h->actuator_seen);
@@ -294,9 +296,7 @@ static enum blackbox_group one_gap(const struct blackbox *box, const struct fit_
 /// black box leaves of it on return.
 static void judge_mean(const struct bench *b, double validation_rms, bool worse, double *io_rest, struct judgement *j)
 {
-    bool named = false;
-    for (int e = 0; sim_effects[e]; e++)
-        named = named || b->hypothesis->named[e];
+    bool named = hypothesis_claims(b->hypothesis) > 0;
     // Beside a given model a right answer leaves noise, and that nothing is wrong is the boldest answer of all. Without
     // one, half as much again is what a machine is like.
     const double too_much = b->hypothesis->inertia_free ? 1.5
@@ -372,7 +372,8 @@ static bool replaces(const struct fit_data *data, const struct sim_coverage *cov
     struct hypothesis swapped = *without;
     if (!hypothesis_may_name(without, in) || !fit_init(&trial, data))
         return false;
-    bool good = search_add(data, coverage, in, without_fit, most_cost, &swapped, &trial) && trial.cost < most_cost;
+    bool good = search_add(data, coverage, in, without_fit, most_cost, &swapped, &trial) && trial.cost < most_cost &&
+                !hypothesis_is_detail(&swapped, in);
     fit_free(&trial);
     return good;
 }
@@ -389,7 +390,7 @@ size_t judge_ties(const struct fit_data *data, const struct sim_coverage *covera
         return 0;
     for (int out = 0; sim_effects[out]; out++) {
         struct hypothesis without = *hypothesis;
-        if (!hypothesis->named[out])
+        if (!hypothesis->named[out] || hypothesis_is_detail(hypothesis, out))
             continue;
         hypothesis_unname(&without, out);
         // A name that may as well be missing is tied to whatever else may be missing.

@@ -32,6 +32,8 @@ static bool can_show(const struct hypothesis *h, const struct sim_coverage *cove
 {
     char why[160];
     double values[sim_effect_parameters_max], unused[sim_effect_parameters_max];
+    if (hypothesis_is_detail(h, effect))
+        return true;
     hypothesis_parameters(h, effect, NULL, values, unused);
     return !sim_effects[effect]->testable || sim_effects[effect]->testable(values, coverage, why, sizeof why);
 }
@@ -346,9 +348,7 @@ static bool has_room(const struct fit_data *data, const struct search_options *o
                      const struct fit *fit)
 {
     const size_t several = 4;
-    size_t count = 0;
-    for (int e = 0; sim_effects[e]; e++)
-        count += h->named[e];
+    size_t count = hypothesis_claims(h);
     return count < options->causes_max && (count < several || !(fit->cost > far_from_noise * (double)data->values));
 }
 

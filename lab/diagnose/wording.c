@@ -167,13 +167,14 @@ void wording_headline(const struct diagnosis *self, char out_text[wording_size])
     case diagnosis_no_discrepancy:
         break;
     }
+    const char *how = refit_matters(self) ? "with its own numbers refitted" : "as given";
     snprintf(out_text, wording_size, "No discrepancy: %s the model fits within what the noise allows",
-             refit_matters(self) ? "with its own numbers refitted" : "as given");
+             self->detail_count > 0 ? "with the detail noted" : how);
 }
 
 bool wording_is_extended(const struct diagnosis *self)
 {
-    return self->cause_count + self->candidate_count > 0;
+    return self->cause_count + self->candidate_count + self->detail_count > 0;
 }
 
 void wording_gain(const struct diagnosis *self, char out_text[wording_size])
@@ -184,7 +185,9 @@ void wording_gain(const struct diagnosis *self, char out_text[wording_size])
     wording_percent(self->refitted.validation_nrmse, refitted);
     wording_percent(self->extended.validation_nrmse, extended);
     wording_percent(self->noise_floor_nrmse, noise);
-    const char *causes = self->cause_count > 1 ? "the causes" : "the cause";
+    const char *causes = self->cause_count > 1   ? "the causes"
+                         : self->cause_count > 0 ? "the cause"
+                                                 : "the detail noted";
     const char *what = self->candidate_count > 0 ? "what was found" : causes; // the extended model has both
     char with_causes[2 * wording_short] = "";
     if (wording_is_extended(self)) {
@@ -229,6 +232,11 @@ const char *wording_measure(const struct diagnosis_untestable *untestable)
 {
     return lacks_reference(untestable) ? "what the controller asks for as well (the reference)"
                                        : sim_effects[untestable->effect]->measure;
+}
+
+void wording_detail(const struct diagnosis_cause *detail, struct oddities *io_oddities)
+{
+    oddities_add(io_oddities, "%s Every drive has some: it is in the extended model, but no cause.", detail->says);
 }
 
 const char *wording_refit(const struct diagnosis *self)

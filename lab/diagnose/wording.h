@@ -67,6 +67,9 @@ void wording_closer(const struct diagnosis *self, char out_text[wording_size]);
 /// What to measure to test for an effect that was not tested for: a clause after "measure".
 const char *wording_measure(const struct diagnosis_untestable *untestable);
 
+/// Says of an effect that is only a detail of how the drive is made that the extended model has it.
+void wording_detail(const struct diagnosis_cause *detail, struct oddities *io_oddities);
+
 enum { wording_runs_size = 512 };
 
 /// Runs by their files, with commas.

@@ -12,6 +12,8 @@
 
 /// Below this the motor is as good as stuck: motion estimated from a measurement is no finer. Rad, and m.
 static const double least = 1e-4, linear_least = 1e-6;
+/// Where a search begins, as a share of that: no dry friction switches, and the shorter way shows next to reversals.
+static const double finest = 0.06;
 
 static double presliding_build_up(const double *p, double *out_exponent)
 {
@@ -22,12 +24,12 @@ static double presliding_build_up(const double *p, double *out_exponent)
 static bool presliding_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index,
                             double *out)
 {
-    const double growth = 3.0;
+    const double growth = 3.2;
     double start = coverage->linear ? linear_least : least;
     (void)model;
-    out[0] = 2.0 * start * pow(growth, (double)index);
+    out[0] = finest * start * pow(growth, (double)index);
     out[1] = 1.0;
-    return index == 0 || (index < 8 && out[0] < 0.2 * coverage->position_span);
+    return index == 0 || (index < 11 && out[0] < 0.2 * coverage->position_span);
 }
 
 static bool presliding_testable(const double *p, const struct sim_coverage *coverage, char *out_why, size_t size)
@@ -38,6 +40,12 @@ static bool presliding_testable(const double *p, const struct sim_coverage *cove
     snprintf(out_why, size, "its distance %.2g %s is outside of %.2g..%.2g, where this motion could show it", p[0],
              coverage->linear ? "m" : "rad", low, high);
     return false;
+}
+
+/// Dry friction of every drive builds up over a few atoms to a few asperities: Coulomb's switch is the simpler word.
+static bool presliding_detail(const double *p, bool linear)
+{
+    return p[0] < (linear ? linear_least : least);
 }
 
 static void presliding_say(const struct sim_finding *f, char *out_text, size_t size)
@@ -80,6 +88,7 @@ const struct sim_effect sim_effect_presliding = {
     .applies = presliding_applies,
     .scan = presliding_scan,
     .testable = presliding_testable,
+    .detail = presliding_detail,
     .measure = "small and slow motions with many reversals",
     .say = presliding_say,
 };

@@ -76,6 +76,26 @@ PYTHON
     --out table --quiet
 "$SERVOSCOPE" simulate --model m.json --table table.mst --periods 2 --out again.csv --quiet || fail "the extended model does not run"
 
+# Dry friction that builds up over less than can be told from a switch is in the extended model, and no cause.
+cat >rigid.json <<'JSON'
+{"structure": "rigid", "motor_inertia_kgm2": 0.005, "viscous_friction_Nms_per_rad": 0.01, "coulomb_friction_Nm": 0.05}
+JSON
+sed 's/}$/, "sensors": {"velocity_noise_rad_per_s": 0.002, "torque_noise_Nm": 0.0005},\
+    "effects": {"presliding": {"presliding_distance_rad": 2e-5}}}/' rigid.json >bristle.json
+for run in 1 2; do
+    "$SERVOSCOPE" simulate --model bristle.json --seed "$run" --table table.mst --mode torque --periods 8 --out "bristle$run.csv" --quiet
+done
+"$SERVOSCOPE" diagnose bristle1.csv --validate bristle2.csv --model rigid.json --json-out d2.json --extended m2.json >said
+python3 - <<'PYTHON' || fail "a short bristle: $(cat said)"
+import json
+said, model = json.load(open("d2.json")), json.load(open("m2.json"))
+assert said["verdict"] == "no_discrepancy" and not said["causes"] and not said["candidates"], said
+assert any("builds up over 2" in note and "no cause" in note for note in said["notes"]), said["notes"]
+assert abs(model["effects"]["presliding"]["presliding_distance_rad"] / 2e-5 - 1) < 0.1, model
+assert said["extended"]["whitened_rms"] < 1.02 < said["refitted"]["whitened_rms"], said
+assert "with the detail noted" in said["headline"] and "with the detail noted" in said["gain"], said
+PYTHON
+
 # --json is one object, the one of --json-out; --quiet is quiet; both forms of --validate; compressed runs; foreign names.
 "$SERVOSCOPE" diagnose a.csv --validate b.csv --model nominal.json --json --json-out again.json >said 2>err
 [ ! -s err ] || fail "standard error with --json: $(cat err)"

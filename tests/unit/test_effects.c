@@ -323,10 +323,12 @@ static void test_effects_that_cannot_show_say_why(void)
             poor.reference_peak *= 1e-6;
             double values[sim_effect_parameters_max] = {0};
             TEST_ASSERT_TRUE(effect->scan(&model, &good, 0, values));
+            for (size_t i = 1; effect->detail && effect->detail(values, linear); i++)
+                TEST_ASSERT_TRUE_MESSAGE(effect->scan(&model, &good, i, values), named(effect, "details only"));
             char why[160] = "";
             if (effect->testable) {
                 TEST_ASSERT_TRUE_MESSAGE(effect->testable(values, &good, why, sizeof why),
-                                         named(effect, "its own first scan value"));
+                                         named(effect, "the first scan value that is a claim"));
                 TEST_ASSERT_FALSE_MESSAGE(effect->testable(values, &poor, why, sizeof why),
                                           named(effect, "testable in nothing"));
                 assert_reason(effect, why);

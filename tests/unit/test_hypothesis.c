@@ -433,6 +433,20 @@ static void test_hypothesis_keeps_what_is_0_or_1_by_construction_near_it(void)
     }
 }
 
+/// A bristle too short to be told from a switch belongs to the drive; a longer one is a cause.
+static void test_hypothesis_claims_what_is_no_detail(void)
+{
+    int effect = effect_of("presliding");
+    const double lengths[] = {2e-5, 2e-4};
+    TEST_ASSERT_FALSE(hypothesis_is_detail(&hypothesis, effect));
+    for (size_t claims = 0; claims < 2; claims++) {
+        struct hypothesis named = hypothesis;
+        hypothesis_name(&named, effect, (double[]){lengths[claims], 1.0});
+        TEST_ASSERT_EQUAL(claims == 0, hypothesis_is_detail(&named, effect));
+        TEST_ASSERT_EQUAL(claims, hypothesis_claims(&named));
+    }
+}
+
 /// exp(log 3) is more than 3, which a model file would refuse.
 static void test_hypothesis_a_number_at_its_wall_is_within_its_bounds_to_the_last_digit(void)
 {
@@ -461,6 +475,7 @@ int main(void)
     RUN_TEST(test_hypothesis_keeps_what_is_0_or_1_by_construction_near_it);
     RUN_TEST(test_hypothesis_starts_as_the_given_model_with_its_numbers_in_narrow_boxes);
     RUN_TEST(test_hypothesis_at_the_walls_gives_values_at_the_walls);
+    RUN_TEST(test_hypothesis_claims_what_is_no_detail);
     RUN_TEST(test_hypothesis_a_number_at_its_wall_is_within_its_bounds_to_the_last_digit);
     RUN_TEST(test_hypothesis_without_reference_leaves_the_actuator_alone);
     RUN_TEST(test_hypothesis_of_no_given_model_frees_the_inertia_and_does_not_name_it);
