@@ -97,7 +97,8 @@ struct sim_model;
 struct sim_coverage {
     double position_span; ///< largest minus smallest position, rad or m
     double velocity_rms, velocity_peak;
-    double torque_rms; ///< Nm or N
+    double velocity_slow; ///< at most this fast it was for long enough to say something of it; 0: not known
+    double torque_rms;    ///< Nm or N
     double torque_peak;
     double reference_peak; ///< of the torque asked for; 0: not recorded
     double position_mean;

@@ -341,6 +341,29 @@ static double steadiness(const struct stretch *b, double mean)
     return xx > 0.0 ? fabs(xt) / sqrt(xx * tt) : 0.0;
 }
 
+static int by_size(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/// Speed that a few samples of a stretch stay below: how slow they are matters, not which share of all they make, or a
+/// long stroke under the excitation would hide what its turns show. 0 if memory is short.
+static double slow_speed(const struct stretch *b)
+{
+    const size_t few = 8, part = 250;
+    size_t rank = b->samples / part > few ? b->samples / part : few;
+    double *speeds = malloc(b->samples * sizeof *speeds), slow = 0.0;
+    if (!speeds)
+        return 0.0;
+    for (size_t i = 0; i < b->samples; i++)
+        speeds[i] = fabs(b->velocity[i]);
+    qsort(speeds, b->samples, sizeof *speeds, by_size);
+    slow = speeds[rank < b->samples ? rank : b->samples - 1];
+    free(speeds);
+    return slow;
+}
+
 static void measure_coverage(struct recording *r)
 {
     const struct stretch *b = &r->block;
@@ -361,6 +384,7 @@ static void measure_coverage(struct recording *r)
         .steadiness = steadiness(b, position / n),
         .velocity_rms = sqrt(velocity / n),
         .velocity_peak = peak,
+        .velocity_slow = slow_speed(b),
         .torque_rms = sqrt(fmax(torque / n - mean * mean, 0.0)),
         .torque_peak = peak_of(r->all.samples, r->all.torque),
         .reference_peak = r->all.torque_ref ? peak_of(r->all.samples, r->all.torque_ref) : 0.0,

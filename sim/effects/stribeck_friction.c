@@ -12,21 +12,30 @@ static void stribeck_oppose(const double *p, const struct sim_motion *motion, st
     io_opposing->dry += p[0] * exp(-ratio * ratio);
 }
 
-static bool stribeck_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
+/// Speeds between which a recording can show a rise towards standstill: it has to have moved that slowly for a few
+/// samples, however small a part they are of all, and faster than that somewhere.
+static void stribeck_range(const struct sim_coverage *coverage, double *out_low, double *out_high)
 {
-    static const double shares[] = {0.03, 0.07, 0.15, 0.3, 0.6};
-    (void)model;
-    if (index >= sizeof shares / sizeof shares[0])
-        return false;
-    out[0] = 0.02 * coverage->torque_rms;
-    out[1] = shares[index] * coverage->velocity_rms;
-    return true;
+    const double standing = 0.002; // of the RMS: an axis at rest does not move slowly
+    *out_low = fmax(coverage->velocity_slow, standing * coverage->velocity_rms);
+    *out_high = coverage->velocity_peak;
 }
 
-/// Slow enough to be friction at low speed, fast enough for the recording to have moved that slowly for a while.
+static bool stribeck_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
+{
+    const double growth = 2.5, first = 2.0;
+    double low, high;
+    (void)model;
+    stribeck_range(coverage, &low, &high);
+    out[0] = 0.02 * coverage->torque_rms;
+    out[1] = first * low * pow(growth, (double)index);
+    return index == 0 || (index < 10 && out[1] < high);
+}
+
 static bool stribeck_testable(const double *p, const struct sim_coverage *coverage, char *out_why, size_t size)
 {
-    double low = 0.02 * coverage->velocity_rms, high = 1.2 * coverage->velocity_rms;
+    double low, high;
+    stribeck_range(coverage, &low, &high);
     bool shown = p[1] > low && p[1] < high;
     if (!shown)
         snprintf(out_why, size, "its speed %.3g is outside of %.3g..%.3g, where this motion could show it", p[1], low,

@@ -380,6 +380,44 @@ static void test_effects_of_no_size_oppose_nothing(void)
     }
 }
 
+/// Whether a recording can show friction that rises towards standstill within `speed`.
+static bool shows_rise_within(double speed, const struct sim_coverage *coverage)
+{
+    char why[160];
+    const double values[] = {0.01, speed};
+    return sim_effects[sim_effect_find("stribeck_friction")]->testable(values, coverage, why, sizeof why);
+}
+
+static void test_effects_rise_of_friction_shows_between_the_slowest_and_the_largest_speed(void)
+{
+    struct sim_coverage shaken = {.velocity_rms = 0.28, .velocity_peak = 1.4, .velocity_slow = 0.0014},
+                        stroked = {.velocity_rms = 8.3, .velocity_peak = 13.0, .velocity_slow = 0.05};
+    TEST_ASSERT_TRUE(shows_rise_within(0.49, &shaken)); // 1.7 times the RMS
+    TEST_ASSERT_FALSE(shows_rise_within(1.5, &shaken));
+    TEST_ASSERT_FALSE(shows_rise_within(0.001, &shaken));
+    TEST_ASSERT_TRUE(shows_rise_within(0.11, &stroked)); // 0.013 times the RMS
+    TEST_ASSERT_FALSE(shows_rise_within(0.04, &stroked));
+    struct sim_coverage resting = stroked;
+    resting.velocity_slow = 0.0; // an axis at rest part of the time
+    TEST_ASSERT_FALSE(shows_rise_within(0.01, &resting));
+}
+
+static void test_effects_rise_of_friction_is_scanned_all_over_what_a_recording_can_show(void)
+{
+    const struct sim_coverage coverage = {
+        .velocity_rms = 8.3, .velocity_peak = 13.0, .velocity_slow = 0.05, .torque_rms = 0.6};
+    const struct sim_effect *effect = sim_effects[sim_effect_find("stribeck_friction")];
+    double values[sim_effect_parameters_max], before = coverage.velocity_slow;
+    size_t count = 0;
+    while (effect->scan(NULL, &coverage, count, values)) {
+        TEST_ASSERT_TRUE(shows_rise_within(values[1], &coverage));
+        TEST_ASSERT_TRUE(values[1] < 3.0 * before); // a fit reaches the next value
+        before = values[1];
+        count++;
+    }
+    TEST_ASSERT_TRUE(3.0 * before > coverage.velocity_peak);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -394,5 +432,7 @@ int main(void)
     RUN_TEST(test_effects_that_cannot_show_say_why);
     RUN_TEST(test_effects_engage_makes_a_valid_model_in_which_they_apply);
     RUN_TEST(test_effects_of_no_size_oppose_nothing);
+    RUN_TEST(test_effects_rise_of_friction_shows_between_the_slowest_and_the_largest_speed);
+    RUN_TEST(test_effects_rise_of_friction_is_scanned_all_over_what_a_recording_can_show);
     return UNITY_END();
 }

@@ -216,6 +216,22 @@ static void test_recording_refuses_a_run_of_few_rows(void)
     assert_refused("63");
 }
 
+/* A slow stroke under the excitation is most of the speed, and a small part of it is as slow as ever. */
+static void test_recording_slow_speed_counts_samples_and_not_shares_of_the_whole(void)
+{
+    for (int stroke = 0; stroke <= 1; stroke++) {
+        for (size_t n = 0; n < rows; n++)
+            position[n] += stroke ? 60.0 * sin(two_pi * (double)n / period) : 0.0;
+        prepare();
+        const struct stretch *b = &recording.block;
+        size_t slower = 0;
+        for (size_t i = 0; i < b->samples; i++)
+            slower += fabs(b->velocity[i]) <= recording.coverage.velocity_slow;
+        TEST_ASSERT_TRUE_MESSAGE(slower >= 8 && slower <= 12, stroke ? "with a stroke" : "without");
+        recording_free(&recording);
+    }
+}
+
 static void test_recording_refuses_an_axis_that_does_not_move(void)
 {
     for (size_t n = 0; n < rows; n++)
@@ -261,6 +277,7 @@ int main(void)
     RUN_TEST(test_recording_block_is_the_mean_of_the_counted_periods);
     RUN_TEST(test_recording_finds_the_excited_bins_or_takes_the_files);
     RUN_TEST(test_recording_measures_what_was_covered);
+    RUN_TEST(test_recording_slow_speed_counts_samples_and_not_shares_of_the_whole);
     RUN_TEST(test_recording_leaves_out_periods_with_lost_samples);
     RUN_TEST(test_recording_refuses_a_run_without_two_whole_periods);
     RUN_TEST(test_recording_finds_a_period_that_the_file_does_not_say);
