@@ -35,7 +35,7 @@ struct work {
     struct search_memo memo; ///< of fit_data
     struct cause_gain gains[sim_effects_max];
     struct repeat repeat;                 ///< of the fit's parameters, on the validation data
-    double own_evidence[sim_effects_max]; ///< of hidden masses, with and without each with its own noise; 0: not known
+    double own_evidence[sim_effects_max]; ///< beside hidden masses, each with its own noise; 0: not known
 };
 
 static void work_free(struct work *w)
@@ -383,9 +383,21 @@ static bool names_new_mass(const struct hypothesis *before, const struct hypothe
     return false;
 }
 
-/// Drops a hidden mass without which the rest does as well, each with its own noise; of several the one that is missed
-/// least. Returns whether memory sufficed.
-static bool drop_hidden_mass(struct work *w, struct hypothesis *h, struct sim_model *io_model)
+/// What is left without one name, with its own noise: that of the rest, where no hidden mass is among it.
+static bool fit_without(struct work *w, const struct hypothesis *h, int effect, struct hypothesis *out,
+                        struct sim_model *out_model)
+{
+    *out = *h;
+    hypothesis_unname(out, effect);
+    hypothesis_model(out, NULL, out_model);
+    if (!hidden_mass_is(effect))
+        return fit_hidden_mass(w, out, out_model);
+    return fit_anew(w, out, out_model) && fit_anew(w, out, out_model);
+}
+
+/// Beside a hidden mass, drops what the rest does as well without, each with its own noise; of several the one that is
+/// missed least. Returns whether memory sufficed.
+static bool drop_beside_hidden_mass(struct work *w, struct hypothesis *h, struct sim_model *io_model)
 {
     if (!fit_hidden_mass(w, h, io_model))
         return false;
@@ -393,16 +405,14 @@ static bool drop_hidden_mass(struct work *w, struct hypothesis *h, struct sim_mo
     struct hypothesis best = *h;
     struct sim_model best_model = *io_model;
     for (int e = 0; sim_effects[e]; e++) {
-        struct hypothesis without = *h;
+        struct hypothesis without;
         struct sim_model model;
-        if (!h->named[e] || !hidden_mass_is(e))
+        if (!h->named[e])
             continue;
-        hypothesis_unname(&without, e);
-        hypothesis_model(&without, NULL, &model);
-        if (!fit_anew(w, &without, &model) || !fit_anew(w, &without, &model))
+        if (!fit_without(w, h, e, &without, &model))
             return false;
         w->own_evidence[e] = 0.5 * (w->fit.cost - cost);
-        double missed = w->fit.cost - credible - 2.0 * search_threshold(&w->fit_data, e);
+        double missed = w->fit.cost - (hidden_mass_is(e) ? credible : cost) - 2.0 * search_threshold(&w->fit_data, e);
         if (missed < fmin(least, 0.0)) {
             least = missed;
             best = without;
@@ -414,6 +424,18 @@ static bool drop_hidden_mass(struct work *w, struct hypothesis *h, struct sim_mo
     *h = best;
     *io_model = best_model;
     return fit_anew(w, h, io_model);
+}
+
+/// What was found to be left without each name is what it is judged by, too.
+static void remember_own_evidence(struct work *w, const struct hypothesis *h)
+{
+    for (int e = 0; sim_effects[e]; e++) {
+        struct hypothesis without = *h;
+        if (!h->named[e] || !(w->own_evidence[e] > 0.0))
+            continue;
+        hypothesis_unname(&without, e);
+        search_remember(&w->fit_data, &without, w->fit.cost + 2.0 * w->own_evidence[e]);
+    }
 }
 
 /// One round of the search. The structure stays where it is meanwhile if the noise depends on it.
@@ -429,7 +451,7 @@ static bool search_once(struct work *w, const struct search_options *options, st
         hidden_mass_release(&free, h);
     hypothesis_model(h, NULL, io_model);
     if (good && concerned && same_names(&before, h))
-        return drop_hidden_mass(w, h, io_model);
+        return drop_beside_hidden_mass(w, h, io_model);
     if (!good || !names_new_mass(&before, h) || !hidden_mass_concerns(&w->fit_data, h))
         return good;
     if (!fit_hidden_mass(w, h, io_model))
@@ -486,8 +508,11 @@ static bool find_causes(const struct diagnosis_request *request, struct work *w,
     for (int pass = 0; contrast_concerns(&model) && pass < 2; pass++)
         if (!fit_anew(w, h, &model))
             return false;
-    if (hidden_mass_concerns(&w->fit_data, h) && !fit_hidden_mass(w, h, &model))
-        return false;
+    if (hidden_mass_concerns(&w->fit_data, h)) {
+        if (!fit_hidden_mass(w, h, &model))
+            return false;
+        remember_own_evidence(w, h);
+    }
     d->extended_model = model;
     d->fit_misfit = w->fit.cost / (double)w->fit_data.values;
     return true;
@@ -532,8 +557,7 @@ static void describe_cause(const struct work *w, const struct diagnosis *d, cons
     const struct sim_effect *e = sim_effects[effect];
     memset(out, 0, sizeof *out);
     out->effect = effect;
-    out->evidence =
-        w->own_evidence[effect] > 0.0 ? w->own_evidence[effect] : search_evidence(&w->fit_data, h, &w->fit, effect);
+    out->evidence = search_evidence(&w->fit_data, h, &w->fit, effect);
     out->gain = w->gains[effect];
     hypothesis_parameters(h, effect, w->fit.covariance, out->values, out->deviations);
     for (size_t i = 0; i < e->parameter_count; i++)

@@ -88,6 +88,16 @@ static void remember(const struct fit_data *data, const struct hypothesis *h, do
     memcpy(f->named, h->named, sizeof f->named);
 }
 
+void search_remember(const struct fit_data *data, const struct hypothesis *hypothesis, double cost)
+{
+    if (!data->memo)
+        return;
+    struct search_fitted *f = find_fitted(data, hypothesis, noise_stamp(data));
+    if (f)
+        f->used = false;
+    remember(data, hypothesis, cost);
+}
+
 double search_evidence(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit,
                        int effect)
 {

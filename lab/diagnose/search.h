@@ -51,6 +51,9 @@ bool search_add(const struct fit_data *data, const struct sim_coverage *coverage
 double search_evidence(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit,
                        int effect);
 
+/// From now on, as long as the noise stays: the names of a hypothesis leave `cost`, which was found elsewhere.
+void search_remember(const struct fit_data *data, const struct hypothesis *hypothesis, double cost);
+
 /// What an effect has to gain before it is a name.
 double search_threshold(const struct fit_data *data, int effect);
 

@@ -4,6 +4,7 @@
 
 #include "lab/diagnose/hidden_mass.h"
 #include "lab/diagnose/repeat.h"
+#include "lab/diagnose/search.h"
 #include "lab/numeric/statistics.h"
 #include "sim/belt_drive.h"
 #include "unity.h"
@@ -347,6 +348,30 @@ static void test_hidden_mass_cost_below_what_noise_leaves_is_not_believed(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 800.0 - 1.645 * 40.0, hidden_mass_credible_cost(&data, 600.0));
 }
 
+/* A fit in which the noise followed says what is left without a name; under other noise that is worth nothing. */
+static void test_search_evidence_is_by_what_was_remembered_until_the_noise_is_another(void)
+{
+    static struct search_memo memo;
+    memset(&memo, 0, sizeof memo);
+    record(9);
+    data.memo = &memo;
+    given.viscous_friction_Nms_per_rad = 0.0;
+    hypothesis_init(&hypothesis, &given, false, true);
+    const struct hypothesis without = hypothesis;
+    int effect = name("viscous_friction", 0.004);
+    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 8));
+    double fitted = search_evidence(&data, &hypothesis, &fit, effect);
+    TEST_ASSERT_TRUE(fitted > 20.0);
+    search_remember(&data, &without, fit.cost + 200.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 100.0, search_evidence(&data, &hypothesis, &fit, effect));
+    search_remember(&data, &without, fit.cost + 300.0); // the last word counts, also where it is more
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 150.0, search_evidence(&data, &hypothesis, &fit, effect));
+    truth.motor_inertia_kgm2 *= 1.01;
+    TEST_ASSERT_TRUE(evidence_estimate_noise(&evidence, &truth));
+    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 8));
+    TEST_ASSERT_DOUBLE_WITHIN(0.1 * fitted, fitted, search_evidence(&data, &hypothesis, &fit, effect));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -360,5 +385,6 @@ int main(void)
     RUN_TEST(test_fit_deviations_are_the_scatter_over_fresh_noise);
     RUN_TEST(test_repeat_adds_by_how_much_other_data_give_another_number);
     RUN_TEST(test_fit_of_a_hidden_mass_ends_at_the_truth_when_the_noise_follows);
+    RUN_TEST(test_search_evidence_is_by_what_was_remembered_until_the_noise_is_another);
     return UNITY_END();
 }
