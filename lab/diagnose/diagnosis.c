@@ -127,13 +127,6 @@ static int choose_model(const struct diagnosis_request *request, const struct re
     return 0;
 }
 
-static const char *input_name(const struct diagnosis *d)
-{
-    if (d->input_unit)
-        return strcmp(d->input_unit, "V") == 0 ? "voltage" : "current";
-    return d->linear ? "force" : "torque";
-}
-
 /// A torque without a reference may be the command itself, which acts from its row on: half a sample later than a
 /// measured one. Only where a rigid body with friction explains nearly all of it can that be told from a spring.
 static void choose_hold(struct work *w, struct diagnosis *d)
@@ -156,7 +149,7 @@ static void choose_hold(struct work *w, struct diagnosis *d)
     oddities_add(&d->oddities,
                  "The %s acts %.2f samples later than straight lines between its rows say: it was taken as a "
                  "command that holds from its row on.",
-                 input_name(d), first.delay);
+                 wording_input(d), first.delay);
 }
 
 /// Without a model and without acceleration torques are balanced instead of moving anything.
@@ -180,7 +173,7 @@ static void choose_sign(struct work *w, struct diagnosis *d, const struct inerti
         return;
     scale_input(w, d, -1.0);
     oddities_add(&d->oddities, "Positive %s accelerates backward (correlation %.2g): its sign was turned.",
-                 strcmp(d->input_unit, "V") == 0 ? "voltage" : "current", guess->correlation);
+                 wording_input(d), guess->correlation);
 }
 
 /// A current or a voltage becomes a torque by what the model's inertia takes; without a model it stays what it is.
@@ -642,7 +635,8 @@ static void list_untestable(const struct work *w, struct diagnosis *d, const str
         if (h->named[e] || sim_effects[e]->notice)
             continue;
         if (sim_effects[e]->place == sim_place_actuator && !h->actuator_seen)
-            snprintf(u->why, sizeof u->why, "no %s reference was recorded beside the %s", input_name(d), input_name(d));
+            snprintf(u->why, sizeof u->why, "no %s reference was recorded beside the %s", wording_input(d),
+                     wording_input(d));
         else if (w->recordings[0].block.still && takes_acceleration(sim_effects[e]))
             snprintf(u->why, sizeof u->why, "nothing accelerates");
         else if (!sim_effects[e]->blind || !sim_effects[e]->blind(coverage, u->why, sizeof u->why))

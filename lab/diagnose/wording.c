@@ -12,12 +12,18 @@ static bool in_input(const struct diagnosis *self)
     return self->input_unit && !self->model_given;
 }
 
+const char *wording_input(const struct diagnosis *self)
+{
+    if (self->input_unit)
+        return strcmp(self->input_unit, "V") == 0 ? "voltage" : "current";
+    return self->linear ? "force" : "torque";
+}
+
 struct wording_units wording_units(const struct diagnosis *self)
 {
     const char *speed = self->linear ? "m/s" : "rad/s";
     if (in_input(self))
-        return (struct wording_units){strcmp(self->input_unit, "V") == 0 ? "voltage" : "current", self->input_unit,
-                                      speed};
+        return (struct wording_units){wording_input(self), self->input_unit, speed};
     return self->linear ? (struct wording_units){"force", "N", speed} : (struct wording_units){"torque", "Nm", speed};
 }
 
@@ -265,12 +271,10 @@ static size_t next_of_untestable(const struct diagnosis *self, size_t max, char 
     }
     if (waiting_count > 0 && count < max) {
         char list[wording_size / 2];
-        const char *what = self->input_unit ? strcmp(self->input_unit, "V") == 0 ? "voltage" : "current"
-                           : self->linear   ? "force"
-                                            : "torque";
         list_names(waiting, waiting_count, sizeof list, list);
         snprintf(out_texts[count++], wording_size,
-                 "To test for %s: record beside the %s what the controller asked for (its reference).", list, what);
+                 "To test for %s: record beside the %s what the controller asked for (its reference).", list,
+                 wording_input(self));
     }
     return count;
 }

@@ -15,6 +15,9 @@ struct wording_units {
     const char *speed_unit;  ///< "rad/s", "m/s"
 };
 
+/// What was recorded beside the motion: "torque", "force", "voltage" or "current".
+const char *wording_input(const struct diagnosis *self);
+
 struct wording_units wording_units(const struct diagnosis *self);
 
 /// Puts the unit of the input for that of the torque into a sentence about an effect, where wording_units() does, and
