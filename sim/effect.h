@@ -102,8 +102,9 @@ struct sim_coverage {
     double torque_peak;
     double reference_peak; ///< of the torque asked for; 0: not recorded
     double position_mean;
-    double steadiness; ///< correlation of position with time, 0..1: 1 at constant speed
-    double duration_s;
+    double steadiness;       ///< correlation of position with time, 0..1: 1 at constant speed
+    double start_s;          ///< of what counts, since the run began
+    double duration_s;       ///< from the run's beginning to the end of what counts
     double frequency_max_hz; ///< highest excited line
     size_t tone_count;
     double tones_hz[sim_tones_max]; ///< strongest lines of what the model leaves, between the excited ones

@@ -373,10 +373,11 @@ static void measure_coverage(struct recording *r)
         high = fmax(high, b->position[i]);
         mean += b->torque[i] / (double)b->samples;
         position += b->position[i];
-        torque += b->torque[i] * b->torque[i];
         velocity += b->velocity[i] * b->velocity[i];
         peak = fmax(peak, fabs(b->velocity[i]));
     }
+    for (size_t i = 0; i < b->samples; i++) // about the mean: a constant torque's rounding must not pass for one
+        torque += (b->torque[i] - mean) * (b->torque[i] - mean);
     double n = (double)b->samples;
     r->coverage = (struct sim_coverage){
         .position_span = high - low,
@@ -385,9 +386,10 @@ static void measure_coverage(struct recording *r)
         .velocity_rms = sqrt(velocity / n),
         .velocity_peak = peak,
         .velocity_slow = slow_speed(b),
-        .torque_rms = sqrt(fmax(torque / n - mean * mean, 0.0)),
+        .torque_rms = sqrt(torque / n),
         .torque_peak = peak_of(r->all.samples, r->all.torque),
         .reference_peak = r->all.torque_ref ? peak_of(r->all.samples, r->all.torque_ref) : 0.0,
+        .start_s = (double)r->starts[0] / r->rate_hz,
         .duration_s = ((double)r->starts[r->periods - 1] + n) / r->rate_hz,
         .frequency_max_hz = (double)r->bins[r->bin_count - 1] * r->rate_hz / n,
         .linear = r->linear,
@@ -399,6 +401,7 @@ void recording_begin(struct recording *self, double start_s)
     double before = self->all.start_s;
     self->all.start_s = start_s;
     self->block.start_s += start_s - before;
+    self->coverage.start_s += start_s - before;
     self->coverage.duration_s += start_s - before;
 }
 

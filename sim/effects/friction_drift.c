@@ -27,14 +27,18 @@ static bool drift_scan(const struct sim_model *model, const struct sim_coverage 
     return true;
 }
 
-/// Neither over before the motion began nor so slow that it has not begun when the motion ends.
+/// Neither over before what counts begins nor so slow that it has not begun when that ends: otherwise it is a factor on
+/// friction, whatever name that deserves.
 static bool drift_testable(const double *p, const struct sim_coverage *coverage, char *out_why, size_t size)
 {
-    double low = 0.01 * coverage->duration_s, high = 20.0 * coverage->duration_s;
-    if (p[1] >= low && p[1] <= high)
+    const double least = 0.05; // of the whole drift
+    double begin = coverage->start_s, end = coverage->duration_s;
+    double seen = exp(-begin / p[1]) - exp(-end / p[1]);
+    if (seen >= least)
         return true;
-    snprintf(out_why, size, "its time constant of %.3g s is outside of %.2g..%.3g s, which %.3g s could show", p[1],
-             low, high, coverage->duration_s);
+    snprintf(out_why, size,
+             "with a time constant of %.3g s %.2g %% of the drift falls between %.3g and %.3g s, it takes %.2g", p[1],
+             100.0 * seen, begin, end, 100.0 * least);
     return false;
 }
 

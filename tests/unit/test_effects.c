@@ -342,6 +342,19 @@ static void test_effects_that_cannot_show_say_why(void)
     TEST_ASSERT_TRUE(reasons >= 4);
 }
 
+static void test_effects_drift_that_is_over_before_anything_counts_is_not_testable(void)
+{
+    const struct sim_effect *drift = sim_effects[sim_effect_find("friction_drift")];
+    struct sim_coverage coverage = coverage_of(false);
+    char why[160] = "";
+    const double fast[] = {0.5, 0.8}, slow[] = {0.5, 6.0};
+    TEST_ASSERT_TRUE(drift->testable(fast, &coverage, why, sizeof why));
+    coverage.start_s = 4.0;
+    TEST_ASSERT_FALSE(drift->testable(fast, &coverage, why, sizeof why));
+    assert_reason(drift, why);
+    TEST_ASSERT_TRUE(drift->testable(slow, &coverage, why, sizeof why));
+}
+
 static void test_effects_engage_makes_a_valid_model_in_which_they_apply(void)
 {
     for (size_t e = 0; sim_effects[e]; e++)
@@ -430,6 +443,7 @@ int main(void)
     RUN_TEST(test_effects_say_in_the_units_of_the_axis);
     RUN_TEST(test_effects_say_never_writes_past_its_buffer);
     RUN_TEST(test_effects_that_cannot_show_say_why);
+    RUN_TEST(test_effects_drift_that_is_over_before_anything_counts_is_not_testable);
     RUN_TEST(test_effects_engage_makes_a_valid_model_in_which_they_apply);
     RUN_TEST(test_effects_of_no_size_oppose_nothing);
     RUN_TEST(test_effects_rise_of_friction_shows_between_the_slowest_and_the_largest_speed);

@@ -124,6 +124,7 @@ static void test_recording_measures_what_was_covered(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, sqrt(0.5 * (1.0 + 0.36 + 0.09)),
                               recording.coverage.torque_rms);                                   // without the constant
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, periods * period / rate_hz, recording.coverage.duration_s); // from the run's begin
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, period / rate_hz, recording.coverage.start_s); // the first period does not count
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 20.0 * rate_hz / period, recording.coverage.frequency_max_hz);
     TEST_ASSERT_FALSE(recording.coverage.linear);
     TEST_ASSERT_TRUE(strlen(recording.motion_from) > 20);
@@ -252,9 +253,11 @@ static void test_recording_refuses_a_constant_torque_whatever_bins_the_file_has(
     run.bins = malloc(sizeof *run.bins);
     run.bins[0] = 3;
     run.bin_count = 1;
-    for (size_t n = 0; n < rows; n++)
-        torque[n] = 0.1;
-    assert_refused("the torque is constant: nothing was excited");
+    for (int size = 1; size < 20; size++) { // the rounding of its sums is no excitation
+        for (size_t n = 0; n < rows; n++)
+            torque[n] = 0.1 * size;
+        assert_refused("the torque is constant: nothing was excited");
+    }
 }
 
 static void test_recording_looks_no_further_than_its_band_whatever_bins_the_file_has(void)
