@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "lab/diagnose/structure.h"
 
+#include "lab/diagnose/evenness.h"
 #include "lab/numeric/fft.h"
 
 #include <math.h>
@@ -125,7 +126,8 @@ static double slow_part(const struct evidence *e, const double *contrasts, const
 }
 
 /// A gain, a friction or a bias that creeps.
-static void find_slow_change(const struct evidence *e, const double *contrasts, double *courses, struct structure *out)
+static void find_slow_change(const struct evidence *e, const double *contrasts, double *courses, double *work,
+                             struct structure *out)
 {
     const struct recording *r = e->recording;
     struct octave octaves[octaves_most];
@@ -137,6 +139,7 @@ static void find_slow_change(const struct evidence *e, const double *contrasts, 
         double sum, excess, values = (double)(last - first);
         double slow = slow_part(e, contrasts, courses, orders, first, last, &sum);
         double nats = larger_variance(slow, values * (double)orders, sum, values * (double)(P - 1), &excess);
+        nats *= evenness(e, contrasts, o->from, o->to - 1, work);
         char where[160];
         snprintf(where, sizeof where, "it changes slowly over the run, at %.3g..%.3g Hz %.2g times the noise in power",
                  (double)o->from * hz, (double)(o->to - 1) * hz, excess);
@@ -291,10 +294,10 @@ bool structure_find(const struct evidence *evidence, const double *contrasts, st
     memset(out_structure, 0, sizeof *out_structure);
     if (!r->periodic || P < fewest_periods)
         return true;
-    double *work = malloc((4 * n + P * (cells + orders_most)) * sizeof *work);
+    double *work = malloc((5 * n + P * (cells + orders_most)) * sizeof *work);
     if (!work)
         return false;
-    find_slow_change(evidence, contrasts, work + 4 * n + P * cells, out_structure);
+    find_slow_change(evidence, contrasts, work + 5 * n + P * cells, work, out_structure);
     find_level(evidence, contrasts, out_structure);
     find_burst(evidence, contrasts, work, out_structure);
     find_line(evidence, out_structure);

@@ -55,6 +55,16 @@ static double burst(size_t n)
     return on ? 0.03 * sin(two_pi * 0.15 * (double)n) : 0.0;
 }
 
+/// Noise of a few instants of each period, as where friction turns: alike at all frequencies.
+static double kicks(size_t n)
+{
+    static const size_t at[] = {61, 203, 411};
+    for (size_t i = 0; i < sizeof at / sizeof at[0]; i++)
+        if (n % samples == at[i])
+            return 0.1 * random_normal(&generator);
+    return 0.0;
+}
+
 /// A bias that jumps in the middle of the fifth period.
 static double jump(size_t n)
 {
@@ -215,6 +225,16 @@ static void test_structure_is_not_found_in_noise(void)
     }
 }
 
+static void test_structure_is_no_slow_change_where_noise_is_that_of_a_few_instants(void)
+{
+    for (uint64_t seed = 200; seed < 260; seed++) {
+        record(kicks, seed);
+        struct structure found = look();
+        TEST_ASSERT_NULL_MESSAGE(strstr(found.where, "slowly"), message);
+        evidence_free(&evidence);
+    }
+}
+
 static void test_structure_finds_a_slow_change_in_its_octave(void)
 {
     record(creep, 16);
@@ -269,6 +289,7 @@ int main(void)
     RUN_TEST(test_contrast_puts_back_what_the_model_of_the_noise_had);
     RUN_TEST(test_contrast_finds_the_phase_of_a_run_that_began_at_another_time);
     RUN_TEST(test_structure_is_not_found_in_noise);
+    RUN_TEST(test_structure_is_no_slow_change_where_noise_is_that_of_a_few_instants);
     RUN_TEST(test_structure_finds_a_slow_change_in_its_octave);
     RUN_TEST(test_structure_finds_a_burst_and_says_when);
     RUN_TEST(test_structure_finds_a_bias_that_jumps_and_says_when);
