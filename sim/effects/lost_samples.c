@@ -53,20 +53,62 @@ static bool moved_across(const struct sim_columns *c, double count, size_t first
     return fmax(across, fmax(before, after)) >= several * count;
 }
 
-/// Rows that are to be expected to repeat wholly by chance, if torque and motion repeat independently of each other: of
-/// those in which only the one or only the other does, and those in which neither. Half a count more each: none seen is
-/// not none possible.
+enum { columns_most = 3 };
+
+/// How often columns repeat in rows that do not repeat wholly.
+struct chances {
+    size_t columns;
+    double alone[columns_most]; ///< column i, whatever the others do
+    double both[columns_most];  ///< all but column i; of two columns the other one
+    double rows;
+};
+
+/// Half a count more each: none seen is not none possible.
+static struct chances count_chances(const struct sim_columns *c)
+{
+    const double *all[columns_most] = {c->torque, c->position, c->velocity}, *column[columns_most] = {NULL};
+    struct chances out = {.alone = {0.5, 0.5, 0.5}, .both = {0.5, 0.5, 0.5}, .rows = 1.0};
+    for (size_t i = 0; i < columns_most; i++)
+        if (all[i])
+            column[out.columns++] = all[i];
+    for (size_t n = 1; n < c->rows; n++) {
+        size_t same = 0, last = 0, other = 0;
+        for (size_t i = 0; i < out.columns; i++) {
+            bool repeated = column[i][n] == column[i][n - 1];
+            same += repeated;
+            last = repeated ? i : last;
+            other = repeated ? other : i;
+        }
+        if (same == out.columns)
+            continue;
+        out.rows += 1.0;
+        if (same == 1)
+            out.alone[last] += 1.0;
+        if (same + 1 == out.columns)
+            out.both[other] += 1.0;
+        for (size_t i = 0; same == 2 && i < out.columns; i++)
+            out.alone[i] += i != other;
+    }
+    return out;
+}
+
+/// Rows that are to be expected to repeat wholly by chance, if one column repeats independently of the others. These
+/// may depend on each other, as a speed does that is made from the position: what the rows show of that counts, and
+/// where they show next to nothing their own chances do. Of the columns that may be the independent one that is taken
+/// which makes the largest number.
 static double expected_by_chance(const struct sim_columns *c)
 {
-    const double *one = c->torque ? c->torque : c->velocity, *other = c->position ? c->position : c->velocity;
-    double only_one = 0.5, only_other = 0.5, neither = 1.0;
-    for (size_t n = 1; n < c->rows; n++) {
-        bool first = one[n] == one[n - 1], second = other[n] == other[n - 1];
-        only_one += first && !second;
-        only_other += second && !first;
-        neither += !first && !second;
+    const double seen = 1.0; // and the half
+    struct chances chances = count_chances(c);
+    double apart = chances.rows, most = 0.0;
+    for (size_t i = 0; i < chances.columns; i++)
+        apart *= chances.alone[i] / fmax(chances.rows - chances.alone[i], 1.0);
+    for (size_t i = 0; i < chances.columns; i++) {
+        double one = chances.alone[i], others = chances.both[i];
+        bool together = chances.columns == 2 || others > seen;
+        most = fmax(most, together ? one * others / fmax(chances.rows - one - others, 1.0) : apart);
     }
-    return only_one * only_other / neither;
+    return most;
 }
 
 /// One column alone may repeat for any reason.

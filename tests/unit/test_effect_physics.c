@@ -482,6 +482,29 @@ static void test_lost_samples_repeat_rows_but_for_the_reference_and_are_noticed(
     TEST_ASSERT_TRUE(evidence > 100.0);
 }
 
+/// Position counts repeat all the time; that noisy torque and speed do so in the same row, nobody waits for.
+static void test_lost_samples_are_noticed_from_two_rows_on_beside_coarse_counts(void)
+{
+    const double doubt = 12.0 + 0.5 * log((double)rows); // repair.c
+    double share, deviation, evidence;
+    model.coulomb_friction_Nm = 0.05;
+    model.sensors.counts_per_rev = 8192.0;
+    model.sensors.torque_noise_Nm = 3e-3;
+    model.sensors.velocity_noise_rad_per_s = 2e-3;
+    record(0.3);
+    TEST_ASSERT_FALSE(notice(&share, &deviation, &evidence));
+    for (size_t n = 1020; n < 1022; n++)
+        for (size_t c = 0; c < 3; c++)
+            column[c][n] = column[c][n - 1];
+    TEST_ASSERT_TRUE(notice(&share, &deviation, &evidence));
+    TEST_ASSERT_TRUE(evidence > doubt);
+    TEST_ASSERT_TRUE(mask[1020] && mask[1021] && !mask[1019] && !mask[1022]);
+    // Two columns alone, of which one repeats often, do not say as much.
+    struct sim_columns two = {.rows = rows, .sample_rate_hz = 1000.0, .torque = column[0], .position = column[1]};
+    sim_effects[sim_effect_find("lost_samples")]->notice(&two, &share, &deviation, &evidence, mask);
+    TEST_ASSERT_TRUE(evidence < doubt);
+}
+
 static void test_lost_samples_are_not_noticed_in_coarse_columns_or_at_rest(void)
 {
     double share, deviation, evidence;
@@ -590,6 +613,7 @@ int main(void)
     RUN_TEST(test_torque_saturation_clips_behind_lag_and_dead_time);
     RUN_TEST(test_encoder_eccentricity_is_in_angle_and_in_a_speed_derived_from_it);
     RUN_TEST(test_lost_samples_repeat_rows_but_for_the_reference_and_are_noticed);
+    RUN_TEST(test_lost_samples_are_noticed_from_two_rows_on_beside_coarse_counts);
     RUN_TEST(test_lost_samples_are_not_noticed_in_coarse_columns_or_at_rest);
     RUN_TEST(test_usual_substep_is_short_enough_for_every_effect);
     RUN_TEST(test_exact_steps_agree_with_integrated_ones);
