@@ -177,6 +177,18 @@ static bool is_preferred(const struct fit_data *data, const struct scan_candidat
     return margin > best_margin;
 }
 
+/// Whether a candidate is too small a part of far too much: beside a given model a name has to outweigh ten times all
+/// that stays (judge.c), and where the best of the catalogue does not take a tenth of it away the rest is not of it,
+/// either. Without a given model a name says what is there at all, however little of it.
+static bool is_lost_cause(const struct fit_data *data, const struct hypothesis *h, double cost_before,
+                          double cost_after)
+{
+    const double part = 0.1;
+    double values = (double)data->values;
+    return !h->inertia_free && cost_after > far_from_noise * values &&
+           cost_before - cost_after < part * (cost_before - values);
+}
+
 /// One round of forward selection. Returns whether an effect was added.
 static bool add_best(const struct fit_data *data, const struct sim_coverage *coverage, struct hypothesis *io_h,
                      struct fit *fit)
@@ -194,6 +206,7 @@ static bool add_best(const struct fit_data *data, const struct sim_coverage *cov
             double margin = scaled_gain(data, fit->cost, scratch.cost) - needed;
             list[i].cost = scratch.cost;
             if (is_preferred(data, &list[i], margin, best, best_margin) &&
+                !is_lost_cause(data, io_h, fit->cost, list[i].cost) &&
                 can_show(&list[i].hypothesis, coverage, list[i].effect)) {
                 best_margin = margin;
                 best = &list[i];

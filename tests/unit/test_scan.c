@@ -2,6 +2,7 @@
 /// Places that a scan finds on top of the given model, in a recording of the simulated drive that has the effect.
 #include "lab/diagnose/scan.h"
 
+#include "lab/diagnose/search.h"
 #include "sim/belt_drive.h"
 #include "unity.h"
 
@@ -20,6 +21,7 @@ static struct fit_data data;
 static struct fit fit;
 static struct hypothesis hypothesis;
 static double columns[4][rows], block[4][samples];
+static double stranger_Nm; ///< of some lines that the torque has, and nothing moves by
 
 void setUp(void)
 {
@@ -29,6 +31,7 @@ void setUp(void)
     truth.load_inertia_kgm2 = 0.001;
     truth.viscous_friction_Nms_per_rad = 0.004;
     given = truth;
+    stranger_Nm = 0.0;
 }
 
 void tearDown(void)
@@ -70,7 +73,9 @@ static void record_and_fit(void)
         struct sim_sample s;
         command_at(n, &command);
         sim_belt_drive_step(&drive, &command, &s);
-        const double row[4] = {s.torque_ref, s.torque, s.position, s.velocity};
+        double turn = two_pi * (double)n / samples;
+        double stranger = stranger_Nm * (cos(23.0 * turn) + sin(31.0 * turn) + cos(37.0 * turn));
+        const double row[4] = {s.torque_ref + stranger, s.torque + stranger, s.position, s.velocity};
         for (size_t c = 0; c < 4; c++) {
             columns[c][n] = row[c];
             block[c][n % samples] += n < lead ? 0.0 : row[c] / periods;
@@ -132,10 +137,39 @@ static void test_scan_finds_no_encoder_out_of_true_where_there_is_none(void)
     scan_free(&scan);
 }
 
+/// Gain in nats of the best effect of the catalogue.
+static double best_gain(void)
+{
+    struct scan scan;
+    double lowest = fit.cost;
+    TEST_ASSERT_TRUE(scan_init(&scan, &data, &recording.coverage, &hypothesis, &fit));
+    for (int e = 0; sim_effects[e]; e++) {
+        struct scan_candidate candidate;
+        if (hypothesis_may_name(&hypothesis, e) && scan_effect(&scan, e, 0.0, &candidate))
+            lowest = fmin(lowest, candidate.cost);
+    }
+    scan_free(&scan);
+    return 0.5 * (fit.cost - lowest);
+}
+
+/// What nothing in the catalogue takes a tenth of away gets no name, and no time, however much its small parts gain.
+static void test_search_names_nothing_where_the_best_is_a_small_part_of_far_too_much(void)
+{
+    const struct search_options options = {.causes_max = 6};
+    stranger_Nm = 0.1;
+    record_and_fit();
+    double gain = best_gain(), left = fit.cost;
+    TEST_ASSERT_TRUE(gain > 100.0 && gain < 0.05 * left && left > 10.0 * (double)data.values);
+    TEST_ASSERT_TRUE(search_run(&data, &recording.coverage, &options, &hypothesis, &fit));
+    for (int e = 0; sim_effects[e]; e++)
+        TEST_ASSERT_FALSE_MESSAGE(hypothesis.named[e], sim_effects[e]->id);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_scan_finds_an_encoder_out_of_true_at_any_phase);
     RUN_TEST(test_scan_finds_no_encoder_out_of_true_where_there_is_none);
+    RUN_TEST(test_search_names_nothing_where_the_best_is_a_small_part_of_far_too_much);
     return UNITY_END();
 }
