@@ -68,18 +68,24 @@ static void opposing(const struct evidence *e, const struct sim_model *model, do
 {
     const struct recording *r = e->recording;
     const struct stretch *b = &r->block;
-    double slow = 0.02 * r->coverage.velocity_rms, half_s = 0.5 / r->rate_hz;
+    const double apart = 0.28867513459481288; // half of 1 / sqrt(3): two points of Gauss make the mean over a sample
+    double slow = 0.02 * r->coverage.velocity_rms, half_s = 0.5 / r->rate_hz, apart_s = apart / r->rate_hz;
     double moved = model->motor_inertia_kgm2 + (model->structure == sim_structure_rigid ? model->load_inertia_kgm2 : 0);
     double share = e->scale_inertia / moved;
     struct sim_stepper stepper;
     sim_stepper_init_once(&stepper, model, 1.0 / r->rate_hz);
     for (size_t n = 0; n < b->samples; n++) {
         size_t next = n + 1 < b->samples ? n + 1 : 0;
+        double middle_s = start_s + half_s + (still ? 0.0 : (double)n / r->rate_hz);
         struct sim_motion at = {.position = b->position[n],
                                 .velocity = 0.5 * (b->velocity[n] + b->velocity[next]),
-                                .time_s = start_s + half_s + (still ? 0.0 : (double)n / r->rate_hz),
+                                .time_s = middle_s - (still ? 0.0 : apart_s),
                                 .linear = r->linear};
         out[n] = share * opposing_now(&stepper, &at, slow);
+        if (still)
+            continue;
+        at.time_s = middle_s + apart_s;
+        out[n] = 0.5 * (out[n] + share * opposing_now(&stepper, &at, slow));
     }
 }
 
@@ -293,22 +299,31 @@ static void keep_tone(struct evidence *c, double *powers, double power, double f
     c->tones_hz[at] = frequency_hz;
 }
 
-/// Evidence in nats for a line at point j against the mean power about it, the line itself and its skirt left out:
-/// noise may have peaks of its own, narrower than the whitening knows, where a load swings under it.
-/// Equation:  m ln(1 + P / (m mean)), the log of how seldom noise does that; a mean of m powers is itself uncertain
-static double line_nats(const struct recording *r, const double *power, size_t points, size_t j)
+/// Evidence in nats for a line at point j against the mean power about it as far as `reach` lines to either side, the
+/// line itself and its skirt left out.
+/// Equation:  m ln(1 + P / (m mean)), the log of how seldom noise does that; a mean of m powers is itself uncertain.
+///            m mean = sum / padding: the harmonics of the period were taken out and are no more in the sum than in m
+static double nats_within(const struct recording *r, const double *power, size_t points, size_t j, size_t reach)
 {
-    size_t skirt = 2 * padding, count = 0, reach = padding * (5 * r->periods > 30 ? 5 * r->periods : 30);
+    size_t skirt = 2 * padding, count = 0, far = padding * reach;
     double sum = 0.0;
-    for (size_t i = j > reach ? j - reach : 1; i < points && i <= j + reach; i++) {
+    for (size_t i = j > far ? j - far : 1; i < points && i <= j + far; i++) {
         if (i + skirt < j || i > j + skirt) {
             sum += power[i];
             count++;
         }
     }
-    // The harmonics of the period were taken out with the mean, and padding adds points, but no information.
+    // Padding adds points, but no information.
     double kept = r->periodic ? 1.0 - 1.0 / (double)r->periods : 1.0, m = kept * (double)count / padding;
-    return sum > 0.0 && m > 0.0 ? m * log1p(power[j] / (sum * padding)) : 0.0;
+    return sum > 0.0 && m > 0.0 ? m * log1p(power[j] * padding / sum) : 0.0;
+}
+
+/// The same against those next to it as well: noise may have peaks of its own, narrower than the whitening knows, where
+/// a load swings under it. Few lines are an uncertain mean, many miss the peak: the lesser evidence counts.
+static double line_nats(const struct recording *r, const double *power, size_t points, size_t j)
+{
+    const size_t near = 8, far = 5 * r->periods > 30 ? 5 * r->periods : 30;
+    return fmin(nats_within(r, power, points, j, near), nats_within(r, power, points, j, far));
 }
 
 static void pick_tones(const struct evidence *e, const double *power, size_t points, double points_per_bin,

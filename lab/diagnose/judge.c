@@ -2,6 +2,7 @@
 #include "lab/diagnose/judge.h"
 
 #include "lab/diagnose/blackbox.h"
+#include "lab/diagnose/constancy.h"
 #include "lab/diagnose/predict.h"
 #include "lab/diagnose/search.h"
 #include "lab/diagnose/structure.h"
@@ -224,6 +225,19 @@ static bool judge_in_time(const struct bench *b, struct judgement *j)
     return all;
 }
 
+/// A name of which there is more in one period than in another is not what it says, however well it suits their mean.
+static bool is_constant(const struct bench *b, int effect, struct judgement *j)
+{
+    double changes = constancy_nats(b->data, b->hypothesis, b->fit, effect);
+    if (!constancy_is_broken(changes, search_evidence(b->data, b->hypothesis, b->fit, effect)))
+        return true;
+    if (!j->unexplained)
+        snprintf(j->where, sizeof j->where, "what %s takes of it changes slowly over the run", sim_effects[effect]->id);
+    j->unexplained = true;
+    j->leftover_in_time = fmax(j->leftover_in_time, changes);
+    return false;
+}
+
 /// The others answer for what stays of the mean of the periods.
 static void judge_others(const struct bench *b, const struct structure *over_time, struct judgement *j)
 {
@@ -245,7 +259,7 @@ static void judge_others(const struct bench *b, const struct structure *over_tim
         }
         if (stands && over_time->found)
             stands = evidence_outside(b->data, b->hypothesis, b->fit, e, over_time) > search_threshold(b->data, e);
-        j->stands[e] = stands;
+        j->stands[e] = stands && is_constant(b, e, j);
     }
 }
 
@@ -331,7 +345,7 @@ static void judge_over_time(const struct structure *over_time, struct judgement 
 {
     if (!over_time->found)
         return;
-    j->leftover_in_time = over_time->nats;
+    j->leftover_in_time = fmax(over_time->nats, over_time->beyond);
     if (!j->unexplained || over_time->nats > j->leftover)
         snprintf(j->where, sizeof j->where, "%s", over_time->where);
     j->unexplained = true;

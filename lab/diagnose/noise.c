@@ -2,6 +2,7 @@
 #include "lab/diagnose/noise.h"
 
 #include "lab/diagnose/predict.h"
+#include "lab/diagnose/slow.h"
 #include "lab/numeric/fft.h"
 
 #include <math.h>
@@ -22,8 +23,9 @@ bool evidence_init(struct evidence *self, const struct recording *recording, dou
     self->covariance = calloc(4 * bins, sizeof(double));
     self->factor = calloc(4 * bins, sizeof(double));
     self->between = calloc(4 * bins, sizeof(double));
+    self->slow = calloc(bins, sizeof *self->slow);
     self->work = malloc((4 * n + 2 * n + 4 * bins) * sizeof(double));
-    if (self->plan && self->covariance && self->factor && self->between && self->work &&
+    if (self->plan && self->covariance && self->factor && self->between && self->slow && self->work &&
         contrast_init(&self->contrast, recording) && kinematics_init(self)) {
         self->values += self->kinematics.values;
         self->allowances = calloc(evidence_allowances * self->values, sizeof *self->allowances);
@@ -41,6 +43,7 @@ void evidence_free(struct evidence *self)
     free(self->covariance);
     free(self->factor);
     free(self->between);
+    free(self->slow);
     free(self->allowances);
     free(self->work);
     contrast_free(&self->contrast);
@@ -151,8 +154,11 @@ static void factorise(const struct evidence *self)
             f[3] = -im * f[1];
         }
         // In a run without periods the residual is part of its own estimate, and one on the average as it is.
+        double scatters = 0.0;
+        for (size_t i = from; i <= to; i++)
+            scatters += (double)(r->periods - 1 - self->slow[i]);
         if (r->periodic)
-            take_bias_back(self, (double)(to - from + 1) * (double)(r->periods - 1), f);
+            take_bias_back(self, scatters, f);
     }
 }
 
@@ -263,7 +269,8 @@ static double *residuals_of_all(const struct evidence *self, const struct sim_mo
     return both;
 }
 
-static void scatter_of_periods(const struct evidence *self, const double *both, double *spectra, double *raw)
+/// Spectra of the periods' residuals less their mean, which comes after them.
+static void deviations_of_periods(const struct evidence *self, const double *both, double *spectra)
 {
     const struct recording *r = self->recording;
     size_t bins = r->band + 1, rows = r->all.samples, P = r->periods;
@@ -276,14 +283,59 @@ static void scatter_of_periods(const struct evidence *self, const double *both, 
         for (size_t i = 0; i < 4 * bins; i++)
             mean[i] += m[i] / (double)P;
     }
-    for (size_t p = 0; p < P; p++) {
-        double *m = spectra + p * 4 * bins;
+    for (size_t p = 0; p < P; p++)
         for (size_t i = 0; i < 4 * bins; i++)
-            m[i] -= mean[i];
+            spectra[p * 4 * bins + i] -= mean[i];
+}
+
+/// Covariance of the mean of the periods, bin by bin, from their deviations.
+static void scatter_of_periods(const struct evidence *self, const double *spectra, double *raw)
+{
+    size_t bins = self->recording->band + 1, P = self->recording->periods;
+    memset(raw, 0, 4 * bins * sizeof *raw);
+    for (size_t p = 0; p < P; p++) {
+        const double *m = spectra + p * 4 * bins;
         for (size_t k = 0; k < bins; k++)
             accumulate(raw + 4 * k, m + 2 * k, self->channels == 2 ? m + 2 * bins + 2 * k : NULL,
                        1.0 / ((double)P * (double)(P - 1)));
     }
+}
+
+/// Whitening by that scatter. What changes slowly over the run, where self->slow says that something does, is no
+/// noise: its courses are taken out of the scatter first, which becomes that of fewer periods.
+static bool whitening_of_periods(struct evidence *self, const double *spectra, const double *raw)
+{
+    size_t bins = self->recording->band + 1, P = self->recording->periods;
+    double *quiet = malloc((4 * bins + slow_orders_most * P) * sizeof *quiet);
+    if (!quiet)
+        return false;
+    double *courses = quiet + 4 * bins;
+    slow_courses(P, courses);
+    memcpy(quiet, raw, 4 * bins * sizeof *quiet);
+    for (size_t k = 0; k < bins; k++) {
+        for (size_t q = 0; q < self->slow[k]; q++) {
+            double m[2], a[2];
+            slow_along(spectra + 2 * k, 4 * bins, P, courses + q * P, m);
+            slow_along(spectra + 2 * bins + 2 * k, 4 * bins, P, courses + q * P, a);
+            accumulate(quiet + 4 * k, m, self->channels == 2 ? a : NULL, -1.0 / ((double)P * (double)(P - 1)));
+        }
+        for (size_t j = 0; j < 4; j++)
+            quiet[4 * k + j] *= (double)(P - 1) / (double)(P - 1 - self->slow[k]);
+    }
+    smooth(self, quiet);
+    factorise(self);
+    free(quiet);
+    return true;
+}
+
+/// Finds the bins in which something changes slowly, against a whitening that knows nothing of it, and whitens again.
+static bool noise_beside_slow_changes(struct evidence *self, const double *spectra, const double *raw)
+{
+    size_t bins = self->recording->band + 1;
+    memset(self->slow, 0, bins * sizeof *self->slow);
+    if (!whitening_of_periods(self, spectra, raw))
+        return false;
+    return !slow_find(self, spectra, 4 * bins, self->slow) || whitening_of_periods(self, spectra, raw);
 }
 
 /// Sum over all periods of the squares of what differs between them, whitened by the noise of one period.
@@ -311,9 +363,11 @@ bool evidence_renew_noise(struct evidence *self, const struct sim_model *model)
     double *spectra = malloc((r->periods + 1) * 4 * bins * sizeof *spectra), *raw = calloc(4 * bins, sizeof *raw);
     bool good = both && spectra && raw;
     if (good) {
-        scatter_of_periods(self, both, spectra, raw);
-        smooth(self, raw);
-        factorise(self);
+        deviations_of_periods(self, both, spectra);
+        scatter_of_periods(self, spectra, raw);
+        good = whitening_of_periods(self, spectra, raw);
+    }
+    if (good) {
         self->scatter = whitened_scatter(self, raw);
         make_allowances(self);
     }
@@ -350,9 +404,11 @@ static bool noise_from_periods(struct evidence *self, const struct sim_model *mo
     double *spectra = malloc((r->periods + 1) * stride * sizeof *spectra);
     bool good = both && spectra;
     if (good) {
-        scatter_of_periods(self, both, spectra, raw);
-        smooth(self, raw);
-        factorise(self);
+        deviations_of_periods(self, both, spectra);
+        scatter_of_periods(self, spectra, raw);
+        good = noise_beside_slow_changes(self, spectra, raw);
+    }
+    if (good) {
         self->scatter = whitened_scatter(self, raw);
         good = contrast_take(self, model, spectra, stride) && contrast_find_tones(self, both) &&
                compare_means(self, model, spectra + r->periods * stride);

@@ -21,6 +21,7 @@ struct evidence {
     struct fft_plan *plan;
     double *covariance; ///< per bin 0..band: S_mm, S_aa, Re S_am, Im S_am of the block's DFT divided by its length
     double *factor;     ///< per bin: inverse Cholesky factor, l_mm, l_aa, Re l_am, Im l_am
+    size_t *slow;       ///< per bin: slow courses over the periods that are no noise, slow.h; 0 nearly everywhere
     double scatter;     ///< whitened squares of what differs between the periods, all summed; 0 without periods
     double *between; ///< spectra, mechanics and actuator: half of what the mean of the periods' residuals has over that
                      ///< of their mean; zeros without periods
@@ -41,7 +42,7 @@ bool evidence_init(struct evidence *self, const struct recording *recording, dou
 void evidence_free(struct evidence *self);
 
 /// Estimates the noise under a model: from the scatter of the periods' residuals about their mean, averaged over
-/// neighbouring bins; in a run without periods from the smoothed spectrum of the residual itself, an upper bound.
+/// neighbouring bins, without slow courses over the periods where these stand out of it; in a run without periods from the smoothed spectrum of the residual itself, an upper bound.
 /// Equation:  C_k = 1 / (P (P-1)) sum_p (R_p - mean) (R_p - mean)^H, smoothed;  R = DFT / N
 ///            The whitening factor is smaller than C_k^-1 by what the few scatters behind an estimate make its inverse
 ///            too large.

@@ -2,6 +2,7 @@
 #include "lab/diagnose/structure.h"
 
 #include "lab/diagnose/evenness.h"
+#include "lab/diagnose/slow.h"
 #include "lab/numeric/fft.h"
 
 #include <math.h>
@@ -9,39 +10,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { cells = 16, orders_most = 2, fewest_periods = 4, octaves_most = 24, bands_most = 48 };
+enum { cells = 16, fewest_periods = 4, bands_most = 48 };
 
 /// What chance may reach in one place; the log of the number of places comes on top.
 static const double floor_nats = 12.0;
 /// Less than this in power nobody would call a structure.
 static const double least_excess = 1.5;
-
-/// Evidence that m of n squares, of sum `part`, have a larger variance than the others; out_excess: how much larger.
-static double larger_variance(double part, double m, double sum, double n, double *out_excess)
-{
-    double rest = sum - part, others = n - m;
-    *out_excess = rest > 0.0 ? part / m / (rest / others) : INFINITY;
-    if (!(part > 0.0 && rest > 0.0) || *out_excess <= 1.0)
-        return 0.0;
-    return 0.5 * (n * log(sum / n) - m * log(part / m) - others * log(rest / others));
-}
-
-/// Bins from .. to - 1 of the block.
-struct octave {
-    size_t from, to;
-};
-
-/// Octaves of the band; the constant part counts with the first lines. Returns how many.
-static size_t split_octaves(size_t band, struct octave out[octaves_most])
-{
-    size_t count = 0, from = 0;
-    for (size_t to = 4; from <= band && count < octaves_most; to *= 2) {
-        bool last = to > band || count + 1 == octaves_most;
-        out[count] = (struct octave){from, last ? band + 1 : to};
-        from = out[count++].to;
-    }
-    return count;
-}
 
 static void add_place(struct structure *s, size_t first, size_t last)
 {
@@ -57,6 +31,7 @@ void structure_merge(struct structure *self, const struct structure *other)
     const struct structure *rest = sum.nats == self->nats && self->found ? other : self;
     for (size_t i = 0; i < rest->place_count; i++)
         add_place(&sum, rest->place_first[i], rest->place_last[i]);
+    sum.beyond = fmax(self->beyond, other->beyond);
     *self = sum;
 }
 
@@ -68,41 +43,28 @@ bool structure_holds(const struct structure *self, size_t bin)
     return false;
 }
 
-static void keep(struct structure *s, const struct octave *at, double nats, double excess, double places,
+/// Returns whether it is beyond chance.
+static bool keep(struct structure *s, const struct slow_octave *at, double nats, double excess, double places,
                  const char *where)
 {
     if (!(nats > floor_nats + log(places)) || !(excess > least_excess))
-        return;
+        return false;
     add_place(s, at->from, at->to - 1);
     if (s->found && nats <= s->nats)
-        return;
+        return true;
     s->found = true;
     s->nats = nats;
     s->excess = excess;
     s->first_bin = at->from;
     s->last_bin = at->to - 1;
     snprintf(s->where, sizeof s->where, "%.*s", (int)sizeof s->where - 1, where);
+    return true;
 }
 
-/// Orthonormal slow courses over the periods: straight and, with six periods or more, curved.
-static size_t slow_courses(size_t periods, double *out)
+/// Half of what `part`, the sum of m squares of which the others are `rest`, has beyond its share in noise.
+static double beyond_noise(double part, double m, double rest, double others)
 {
-    size_t orders = periods >= 6 ? 2 : 1;
-    for (size_t q = 0; q < orders; q++) {
-        double *course = out + q * periods, norm = 0.0, mean = 0.0;
-        for (size_t p = 0; p < periods; p++) {
-            double u = (2.0 * (double)p - (double)(periods - 1)) / (double)periods;
-            course[p] = q == 0 ? u : u * u;
-            mean += course[p] / (double)periods;
-        }
-        for (size_t p = 0; p < periods; p++) {
-            course[p] -= mean; // even and odd courses are orthogonal by themselves
-            norm += course[p] * course[p];
-        }
-        for (size_t p = 0; p < periods; p++)
-            course[p] /= sqrt(norm);
-    }
-    return orders;
+    return 0.5 * fmax(part - m * rest / others, 0.0);
 }
 
 /// Values from .. to - 1 of each period: how much of their squares lies in slow courses.
@@ -130,20 +92,21 @@ static void find_slow_change(const struct evidence *e, const double *contrasts, 
                              struct structure *out)
 {
     const struct recording *r = e->recording;
-    struct octave octaves[octaves_most];
-    size_t P = r->periods, orders = slow_courses(P, courses), count = split_octaves(r->band, octaves);
+    struct slow_octave octaves[slow_octaves_most];
+    size_t P = r->periods, orders = slow_courses(P, courses), count = slow_octaves(r->band, octaves);
     double hz = r->rate_hz / (double)r->block.samples;
     for (size_t i = 0; i < count; i++) {
-        const struct octave *o = &octaves[i];
+        const struct slow_octave *o = &octaves[i];
         size_t first = o->from == 0 ? 0 : 2 * o->from - 1, last = 2 * o->to - 1;
         double sum, excess, values = (double)(last - first);
         double slow = slow_part(e, contrasts, courses, orders, first, last, &sum);
-        double nats = larger_variance(slow, values * (double)orders, sum, values * (double)(P - 1), &excess);
+        double nats = slow_larger_variance(slow, values * (double)orders, sum, values * (double)(P - 1), &excess);
         nats *= evenness(e, contrasts, o->from, o->to - 1, work);
         char where[160];
         snprintf(where, sizeof where, "it changes slowly over the run, at %.3g..%.3g Hz %.2g times the noise in power",
                  (double)o->from * hz, (double)(o->to - 1) * hz, excess);
-        keep(out, o, nats, excess, (double)count, where);
+        if (keep(out, o, nats, excess, (double)count, where))
+            out->beyond += beyond_noise(slow, values * (double)orders, sum - slow, values * (double)(P - 1 - orders));
     }
 }
 
@@ -176,17 +139,18 @@ static void find_level(const struct evidence *e, const double *contrasts, struct
             sum += square;
             level += i == 0 ? square : 0.0;
         }
-    double nats = larger_variance(level, (double)(P - 1), sum, (double)((P - 1) * (2 * last + 1)), &excess);
+    double nats = slow_larger_variance(level, (double)(P - 1), sum, (double)((P - 1) * (2 * last + 1)), &excess);
     double at_s = r->all.start_s + (double)r->starts[change_point(e, contrasts)] / r->rate_hz;
     char where[160];
     snprintf(where, sizeof where,
              "the constant part differs between periods by %.2g times the noise, most of all from about %.3g s on",
              sqrt(excess), at_s);
-    keep(out, &(struct octave){0, 1}, nats, excess, 1.0, where);
+    if (keep(out, &(struct slow_octave){0, 1}, nats, excess, 1.0, where))
+        out->beyond += beyond_noise(level, (double)(P - 1), sum - level, (double)((P - 1) * 2 * last));
 }
 
 /// One period's whitened contrasts in time: white, if they are noise. Sums of squares over equal stretches.
-static void stretch_powers(const struct evidence *e, const double *values, const struct octave *o, double *work,
+static void stretch_powers(const struct evidence *e, const double *values, const struct slow_octave *o, double *work,
                            double *out_powers)
 {
     size_t n = e->recording->block.samples;
@@ -207,7 +171,7 @@ static void stretch_powers(const struct evidence *e, const double *values, const
 
 /// Stretches that are louder in one period than in the others: compared at the same place of the period, because noise
 /// may well depend on the motion. One that is beyond chance by itself counts, and so do several that are nearly so.
-static void find_burst_in(const struct evidence *e, const struct octave *o, const double *powers, double octaves,
+static void find_burst_in(const struct evidence *e, const struct slow_octave *o, const double *powers, double octaves,
                           struct structure *out)
 {
     const struct recording *r = e->recording;
@@ -219,7 +183,7 @@ static void find_burst_in(const struct evidence *e, const struct octave *o, cons
         double sum = 0.0, excess;
         for (size_t p = 0; p < P; p++)
             sum += powers[p * cells + i % cells];
-        double nats = larger_variance(powers[i], values, sum, values * (double)P, &excess);
+        double nats = slow_larger_variance(powers[i], values, sum, values * (double)P, &excess);
         if (nats > common_nats) {
             together += nats - common_nats;
             loud++;
@@ -244,16 +208,16 @@ static void find_burst_in(const struct evidence *e, const struct octave *o, cons
 }
 
 /// Bands to look for bursts in: octaves, the wide ones in pieces, because what swings for a moment is narrow.
-static size_t split_bands(size_t band, struct octave out[bands_most])
+static size_t split_bands(size_t band, struct slow_octave out[bands_most])
 {
-    struct octave octaves[octaves_most];
-    size_t octave_count = split_octaves(band, octaves), count = 0;
+    struct slow_octave octaves[slow_octaves_most];
+    size_t octave_count = slow_octaves(band, octaves), count = 0;
     size_t widest = 2 * cells > band / 16 ? 2 * cells : band / 16;
     for (size_t i = 0; i < octave_count; i++) {
         size_t width = octaves[i].to - octaves[i].from, pieces = (width + widest - 1) / widest;
         for (size_t j = 0; j < pieces && count < bands_most; j++)
             out[count++] =
-                (struct octave){octaves[i].from + j * width / pieces, octaves[i].from + (j + 1) * width / pieces};
+                (struct slow_octave){octaves[i].from + j * width / pieces, octaves[i].from + (j + 1) * width / pieces};
     }
     return count;
 }
@@ -261,7 +225,7 @@ static size_t split_bands(size_t band, struct octave out[bands_most])
 static void find_burst(const struct evidence *e, const double *contrasts, double *work, struct structure *out)
 {
     const size_t fewest_bins = cells; // two values per stretch
-    struct octave bands[bands_most];
+    struct slow_octave bands[bands_most];
     size_t P = e->recording->periods, count = split_bands(e->recording->band, bands);
     double *powers = work + 4 * e->recording->block.samples;
     for (size_t i = 0; i < count; i++) {
@@ -284,7 +248,7 @@ static void find_line(const struct evidence *e, struct structure *out)
     // What changes slowly or for a moment has lines as well, but says less by them.
     if (out->found && bin + 1 >= out->first_bin && bin <= out->last_bin + 1)
         return;
-    keep(out, &(struct octave){bin, bin + 2}, e->tone_nats, INFINITY, (double)(r->band * r->periods), where);
+    keep(out, &(struct slow_octave){bin, bin + 2}, e->tone_nats, INFINITY, (double)(r->band * r->periods), where);
 }
 
 bool structure_find(const struct evidence *evidence, const double *contrasts, struct structure *out_structure)
@@ -294,7 +258,7 @@ bool structure_find(const struct evidence *evidence, const double *contrasts, st
     memset(out_structure, 0, sizeof *out_structure);
     if (!r->periodic || P < fewest_periods)
         return true;
-    double *work = malloc((5 * n + P * (cells + orders_most)) * sizeof *work);
+    double *work = malloc((5 * n + P * (cells + slow_orders_most)) * sizeof *work);
     if (!work)
         return false;
     find_slow_change(evidence, contrasts, work + 5 * n + P * cells, work, out_structure);
@@ -324,11 +288,11 @@ void structure_find_slow(const struct evidence *evidence, const double *whitened
         values++;
         slow_values += bin <= slow;
     }
-    double nats = larger_variance(part, (double)slow_values, sum, (double)values, &excess);
+    double nats = slow_larger_variance(part, (double)slow_values, sum, (double)values, &excess);
     double hz = r->rate_hz / (double)r->block.samples;
     char where[160];
     snprintf(where, sizeof where, "it changes slowly over the run, below %.2g Hz %.2g times the noise in power",
              (double)slow * hz, excess);
     if (excess > enough)
-        keep(out_structure, &(struct octave){0, slow + 1}, nats, excess, 1.0, where);
+        keep(out_structure, &(struct slow_octave){0, slow + 1}, nats, excess, 1.0, where);
 }

@@ -7,11 +7,13 @@
 
 enum { structure_places_max = 24 };
 
-/// Something beyond chance. Nats are log-likelihood ratios against equal variance.
+/// Something beyond chance. Nats are log-likelihood ratios against equal variance: however large it is, they hardly
+/// grow. What it would be worth to a model that has it says `beyond`.
 struct structure {
     bool found;
     double nats;                ///< of the strongest, as are excess, the bins and the words
     double excess;              ///< its power over that of the rest
+    double beyond;              ///< nats that all slow changes and levels have over the rest, if that is the noise
     size_t first_bin, last_bin; ///< of the block, where it is
     char where[160];            ///< empty if nothing was found
     size_t place_count;         ///< all that were found; more than structure_places_max are left out

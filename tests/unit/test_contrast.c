@@ -3,6 +3,7 @@
 /// for either.
 #include "lab/diagnose/contrast.h"
 
+#include "lab/diagnose/constancy.h"
 #include "lab/diagnose/noise.h"
 #include "lab/diagnose/structure.h"
 #include "lab/numeric/statistics.h"
@@ -42,6 +43,21 @@ static const double line_Nm = 0.002, line_hz = 24.37, line_rad = 0.8;
 static double line(size_t n)
 {
     return line_Nm * cos(two_pi * line_hz * ((double)n + 0.5) / rate_hz + line_rad);
+}
+
+/// A fifth of the noise, 40 times its mean power per line of the whole stretch.
+static double faint_line(size_t n)
+{
+    return 0.2 * line(n);
+}
+
+static const double fast_Nm = 0.02, fast_hz = 180.37;
+
+/// The mean over a sample of a line that turns through a sixth of a turn meanwhile.
+static double fast_line(size_t n)
+{
+    double half = 0.5 * two_pi * fast_hz / rate_hz;
+    return fast_Nm * sin(half) / half * cos(two_pi * fast_hz * ((double)n + 0.5) / rate_hz + line_rad);
 }
 
 static double creep(size_t n)
@@ -180,6 +196,45 @@ static void test_contrast_sizes_a_line_and_takes_it_out(void)
     free(left);
 }
 
+static void test_contrast_finds_a_line_from_a_fifth_of_the_noise_on(void)
+{
+    const double resolution_hz = rate_hz / (periods * samples);
+    for (uint64_t seed = 200; seed < 206; seed++) {
+        record(faint_line, seed);
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(1, evidence.tone_count, message);
+        TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(resolution_hz, line_hz, evidence.tones_hz[0], message);
+        evidence_free(&evidence);
+    }
+}
+
+/// One in 300 runs is expected to have a line by chance.
+static void test_contrast_finds_no_lines_in_noise(void)
+{
+    size_t found = 0;
+    for (uint64_t seed = 300; seed < 340; seed++) {
+        record(nothing, seed);
+        found += evidence.tone_count;
+        evidence_free(&evidence);
+    }
+    TEST_ASSERT_LESS_THAN_UINT(3, found);
+}
+
+static void test_contrast_sizes_a_fast_line_by_its_mean_over_a_sample(void)
+{
+    enum { runs = 8 };
+    double mean = 0.0;
+    for (uint64_t seed = 400; seed < 400 + runs; seed++) {
+        double values[sim_effect_parameters_max] = {1e-4, 0.0, fast_hz};
+        record(fast_line, seed);
+        TEST_ASSERT_TRUE(contrast_size_effect(&evidence, &model, disturbance(), values));
+        mean += values[0] / runs;
+        evidence_free(&evidence);
+    }
+    // Whitened by what it makes of the noise itself, a line's size scatters by 2 %, the mean of eight by 0.8 %. What it
+    // is half way through a sample is 5 % more than over the sample.
+    TEST_ASSERT_DOUBLE_WITHIN(0.025 * fast_Nm, fast_Nm, mean);
+}
+
 /// Under the model that has the line, the contrasts without it come out as those of the model that lacks it.
 static void test_contrast_puts_back_what_the_model_of_the_noise_had(void)
 {
@@ -244,6 +299,66 @@ static void test_structure_finds_a_slow_change_in_its_octave(void)
     TEST_ASSERT_TRUE(found.first_bin <= 12 && found.last_bin >= 12);
 }
 
+/// What it would be worth to a model that has it grows with its power, the evidence against equal variance hardly.
+static void test_structure_says_what_a_slow_change_is_worth(void)
+{
+    record(creep, 16);
+    struct structure found = look();
+    double sum = 0.0;
+    for (size_t p = 0; p < periods; p++)
+        for (size_t i = 2 * 12 - 1; i <= 2 * 12; i++)
+            sum += pow(evidence.contrast.base[p * evidence.contrast.width + i], 2.0);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.25 * 0.5 * sum, 0.5 * sum, found.beyond, message);
+    TEST_ASSERT_TRUE_MESSAGE(found.beyond > 2.0 * found.nats, message);
+}
+
+/// The noise about a line that creeps is what it is beside one that does not, and elsewhere nothing is taken for slow.
+static void test_noise_leaves_slow_changes_out_where_they_stand_out(void)
+{
+    double quiet[band + 1];
+    record(nothing, 20);
+    for (size_t k = 0; k <= band; k++) {
+        quiet[k] = evidence.covariance[4 * k];
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(0, evidence.slow[k], message);
+    }
+    evidence_free(&evidence);
+    record(creep, 20);
+    TEST_ASSERT_TRUE_MESSAGE(evidence.slow[12] > 0 && evidence.slow[band] == 0, message);
+    for (size_t k = 8; k < 16; k++)
+        TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.5 * quiet[k], quiet[k], evidence.covariance[4 * k], message);
+}
+
+/// Evidence that a torque of one line, in phase with the one that creeps or a quarter of a turn away, does not stay.
+static double changes(double phase)
+{
+    double signal[samples];
+    struct hypothesis hypothesis = {.count = 1, .coordinates = {{.effect = sim_effect_find("viscous_friction")}}};
+    for (size_t i = 0; i < samples; i++)
+        signal[i] = sin(two_pi * 12.0 * (double)i / samples + phase);
+    double *column = malloc(evidence.values * sizeof *column);
+    evidence_whiten(&evidence, signal, NULL, column);
+    struct fit_data data = {
+        .runs = 1, .evidence = &evidence, .values = evidence.values, .contrasts = evidence.contrast.values};
+    struct fit fit = {.rows = data.values, .jacobian = column};
+    double nats = constancy_nats(&data, &hypothesis, &fit, hypothesis.coordinates[0].effect);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, constancy_nats(&data, &hypothesis, &fit, disturbance()));
+    free(column);
+    return nats;
+}
+
+static void test_constancy_is_broken_by_what_creeps_along_the_name_and_by_nothing_else(void)
+{
+    record(creep, 21);
+    TEST_ASSERT_TRUE_MESSAGE(changes(0.0) > 100.0, message);
+    TEST_ASSERT_TRUE_MESSAGE(changes(0.25 * two_pi) < 12.0, message);
+    evidence_free(&evidence);
+    record(nothing, 21);
+    TEST_ASSERT_TRUE_MESSAGE(changes(0.0) < 12.0, message);
+    TEST_ASSERT_TRUE(constancy_is_broken(13.0, 1000.0));
+    TEST_ASSERT_FALSE(constancy_is_broken(11.0, 100.0));  // chance
+    TEST_ASSERT_FALSE(constancy_is_broken(13.0, 2000.0)); // it comes and goes by less than a tenth
+}
+
 static void test_structure_finds_a_burst_and_says_when(void)
 {
     record(burst, 17);
@@ -285,12 +400,18 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_contrast_of_noise_has_the_variance_that_is_expected);
     RUN_TEST(test_contrast_finds_a_line_that_was_not_excited);
+    RUN_TEST(test_contrast_finds_a_line_from_a_fifth_of_the_noise_on);
+    RUN_TEST(test_contrast_finds_no_lines_in_noise);
     RUN_TEST(test_contrast_sizes_a_line_and_takes_it_out);
+    RUN_TEST(test_contrast_sizes_a_fast_line_by_its_mean_over_a_sample);
     RUN_TEST(test_contrast_puts_back_what_the_model_of_the_noise_had);
     RUN_TEST(test_contrast_finds_the_phase_of_a_run_that_began_at_another_time);
     RUN_TEST(test_structure_is_not_found_in_noise);
     RUN_TEST(test_structure_is_no_slow_change_where_noise_is_that_of_a_few_instants);
     RUN_TEST(test_structure_finds_a_slow_change_in_its_octave);
+    RUN_TEST(test_structure_says_what_a_slow_change_is_worth);
+    RUN_TEST(test_noise_leaves_slow_changes_out_where_they_stand_out);
+    RUN_TEST(test_constancy_is_broken_by_what_creeps_along_the_name_and_by_nothing_else);
     RUN_TEST(test_structure_finds_a_burst_and_says_when);
     RUN_TEST(test_structure_finds_a_bias_that_jumps_and_says_when);
     RUN_TEST(test_structure_merges_places_and_keeps_the_stronger_words);
