@@ -141,6 +141,10 @@ struct sim_effect {
     /// Changes the belt at one instant. Called in the order of sim_effects, which is that of the names: backlash takes
     /// its part of the twist before a spring that hardens sees it.
     void (*bend)(const double *parameters, const struct sim_motion *motion, struct sim_belt *io_belt);
+    /// Factor by which the effect changes a number of the base model (offset `along_offset`) at a position. A recording
+    /// that stays near one place knows the product there best.
+    double (*along)(const double *parameters, double position);
+    size_t along_offset;
     /// Gives the mass that hangs on the load (on the one body of a rigid drive). A model has room for one.
     void (*attach)(const double *parameters, struct sim_attached_mass *out_mass);
     /// Torque that the motor makes of what comes out of lag and dead time.

@@ -483,6 +483,7 @@ static bool find_causes(const struct diagnosis_request *request, struct work *w,
     struct sim_model model;
     double step;
     hypothesis_init(h, &d->given, !d->model_given && d->inertia_seen, w->recordings[0].block.torque_ref != NULL);
+    h->middle = w->recordings[0].coverage.position_mean;
     h->sensors_seen = w->evidence[0].kinematics.values > 0;
     h->gain_free = d->input_unit && d->model_given;
     if (!refit_given(w, d, h, &model))

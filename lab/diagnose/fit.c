@@ -98,6 +98,28 @@ double fit_cost(struct fit *self, const struct fit_data *data, const struct hypo
     return self->cost;
 }
 
+/// Moves coordinate i to `to`, and by what is returned the number that its effect changes along the travel, so
+/// that in the middle it stays. Moved alone the two do nearly the same there, much more than either does elsewhere, and
+/// of the difference of two such derivatives little would be right.
+static double move(const struct hypothesis *h, size_t i, double to, double *io_x)
+{
+    size_t along = hypothesis_along(h, i);
+    double shift = along < h->count ? hypothesis_along_shift(h, io_x, i, to) : 0.0;
+    io_x[i] = to;
+    if (along < h->count)
+        io_x[along] += shift;
+    return shift;
+}
+
+/// Takes out of a derivative what belongs to the coordinate that was moved along.
+static void take_shift_back(const struct fit *self, const struct hypothesis *h, size_t i, double shift,
+                            double *io_column)
+{
+    const double *other = self->jacobian + hypothesis_along(h, i) * self->rows;
+    for (size_t j = 0; shift != 0.0 && j < self->rows; j++)
+        io_column[j] -= shift * other[j];
+}
+
 /// One-sided differences, away from the nearer bound. The residual is nearly linear in most coordinates, so that a step
 /// large enough to average over the instants at which friction changes sign costs no accuracy.
 static void differentiate_by(const struct fit *self, const struct fit_data *data, const struct hypothesis *h, size_t i,
@@ -109,11 +131,12 @@ static void differentiate_by(const struct fit *self, const struct fit_data *data
     double step = c->scale == coordinate_logarithmic ? 2e-4 : 1e-3 * fmax(fabs(h->x[i]), 0.3);
     if (h->x[i] + step > c->upper)
         step = -step;
-    x[i] += step;
     size_t rows;
+    double shift = move(h, i, h->x[i] + step, x);
     residual_at(data, h, x, out_column, &rows);
     for (size_t j = 0; j < self->rows; j++)
         out_column[j] = (out_column[j] - self->residual[j]) / step;
+    take_shift_back(self, h, i, shift / step, out_column);
 }
 
 /// Index of the same coordinate in another hypothesis, or its count.
@@ -151,10 +174,23 @@ static bool is_nearly_known(const struct coordinate *c)
     return c->effect < 0 && c->scale == coordinate_logarithmic && c->weight > 0.0 && c->upper - c->lower < narrow;
 }
 
+/// Those last whose derivatives need another's.
+static void sort_coordinates(const struct hypothesis *h, size_t *out_order)
+{
+    size_t count = 0;
+    for (int last = 0; last < 2; last++)
+        for (size_t i = 0; i < h->count; i++)
+            if ((hypothesis_along(h, i) < h->count) == (last == 1))
+                out_order[count++] = i;
+}
+
 static void differentiate(struct fit *self, const struct fit_data *data, const struct hypothesis *h,
                           const struct lender *lender)
 {
-    for (size_t i = 0; i < h->count; i++) {
+    size_t order[hypothesis_coordinates_max];
+    sort_coordinates(h, order);
+    for (size_t k = 0; k < h->count; k++) {
+        size_t i = order[k];
         const struct coordinate *c = &h->coordinates[i];
         double *column = self->jacobian + i * self->rows;
         size_t j = lender->hypothesis && is_nearly_known(c) ? find_coordinate(lender->hypothesis, c) : SIZE_MAX;
@@ -276,6 +312,32 @@ static bool take_step(struct fit *self, const struct fit_data *data, struct hypo
     return before - cost > settled;
 }
 
+/// A number and what changes it along the travel make a curved valley.
+static bool is_curved(const struct hypothesis *h)
+{
+    for (size_t i = 0; i < h->count; i++)
+        if (hypothesis_along(h, i) < h->count)
+            return true;
+    return false;
+}
+
+/// Where a step to x, whose residual is in `trial`, ended on the side of a curved valley: one more with the same
+/// derivatives leads back to its floor. `useful`: whether there is anything to be had.
+static bool take_chord(struct fit *self, const struct fit_data *data, struct hypothesis *h, bool useful,
+                       const double *x, double *work, double *trial)
+{
+    bool taken = false;
+    double y[hypothesis_coordinates_max], damping = 0.0;
+    double covariance[hypothesis_coordinates_max * hypothesis_coordinates_max];
+    struct hypothesis there = *h;
+    struct fit ended = *self;
+    memcpy(there.x, x, h->count * sizeof *x);
+    ended.residual = trial;
+    if (useful && is_curved(h) && solve_step(&ended, &there, 0.0, farthest_step, work, y, covariance))
+        take_step(self, data, h, y, trial, 0.0, &damping, &taken);
+    return taken;
+}
+
 /// Width of a secant: as far as the residual changes by `far` standard deviations, if that is a step that a derivative
 /// says anything about.
 static double secant_width(const struct fit *self, const struct hypothesis *h, size_t i)
@@ -290,7 +352,10 @@ static double secant_width(const struct fit *self, const struct hypothesis *h, s
 /// Columns of the Jacobian by secants about x, from the present ones' sizes. `work`: rows.
 static void take_secants(struct fit *self, const struct fit_data *data, const struct hypothesis *h, double *work)
 {
-    for (size_t i = 0; i < h->count; i++) {
+    size_t order[hypothesis_coordinates_max];
+    sort_coordinates(h, order);
+    for (size_t k = 0; k < h->count; k++) {
+        size_t i = order[k];
         double width = secant_width(self, h, i), *column = self->jacobian + i * self->rows;
         double x[hypothesis_coordinates_max];
         size_t rows;
@@ -299,12 +364,13 @@ static void take_secants(struct fit *self, const struct fit_data *data, const st
         double below = fmax(h->x[i] - width, h->coordinates[i].lower);
         if (!(above > below))
             continue;
-        x[i] = above;
+        double shift = move(h, i, above, x);
         residual_at(data, h, x, column, &rows);
-        x[i] = below;
+        shift -= move(h, i, below, memcpy(x, h->x, sizeof x));
         residual_at(data, h, x, work, &rows);
         for (size_t j = 0; j < self->rows; j++)
             column[j] = (column[j] - work[j]) / (above - below);
+        take_shift_back(self, h, i, shift / (above - below), column);
     }
 }
 
@@ -368,6 +434,13 @@ static bool finish(struct fit *self, const struct fit_data *data, struct hypothe
     return good && is_rough(data, h) ? polish(self, data, h) : good;
 }
 
+/// Whether steps like the last one, from a cost of `before`, still lead to the goal; before == cost: none was taken.
+static bool leads_on(const struct fit *self, const struct course *course, size_t done, double before)
+{
+    double fall = before - self->cost;
+    return !(fall > 0.0) || self->cost - (double)(course->iterations - done) * fall < course->goal;
+}
+
 static bool improve(struct fit *self, const struct fit_data *data, struct hypothesis *h, const struct lender *lender,
                     const struct course *course)
 {
@@ -382,16 +455,17 @@ static bool improve(struct fit *self, const struct fit_data *data, struct hypoth
     const size_t tries = 3; // per iteration: one that fails costs a residual, but no derivatives
     size_t i = 0;
     for (size_t tried = 0; i < course->iterations && tried < tries * course->iterations && good && more; tried++) {
-        if (!fresh)
+        bool first = !fresh;
+        if (first)
             differentiate(self, data, h, lender);
         fresh = true;
         good = solve_step(self, h, damping, farthest_step, work, x, self->covariance);
         bool taken = false;
         double before = self->cost;
         more = good && moved(h, x) && take_step(self, data, h, x, trial, course->settled, &damping, &taken);
+        taken = taken || (first && take_chord(self, data, h, more, x, work, trial));
         i += taken;
-        if (taken)
-            more = more && self->cost - (double)(course->iterations - i) * (before - self->cost) < course->goal;
+        more = more && leads_on(self, course, i, before);
         fresh = !taken;
     }
     if (good && course->finish) {

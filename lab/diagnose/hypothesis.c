@@ -227,6 +227,46 @@ static void rebuild_engaged(struct hypothesis *self)
     }
 }
 
+size_t hypothesis_along(const struct hypothesis *self, size_t i)
+{
+    const struct coordinate *c = &self->coordinates[i];
+    if (c->effect < 0 || !sim_effects[c->effect]->along)
+        return self->count;
+    size_t j = find_offset(self, sim_effects[c->effect]->along_offset);
+    return j < self->count && self->coordinates[j].scale == coordinate_logarithmic ? j : self->count;
+}
+
+/// Logarithm of the factor by which an effect changes a number of the model in the middle of the travel.
+static double log_factor(const struct hypothesis *self, const double *x, int effect)
+{
+    struct sim_model model;
+    hypothesis_model(self, x, &model);
+    return log(sim_effects[effect]->along(model.effect_parameters[effect], self->middle));
+}
+
+double hypothesis_along_shift(const struct hypothesis *self, const double *x, size_t i, double to)
+{
+    double moved[hypothesis_coordinates_max];
+    int effect = self->coordinates[i].effect;
+    memcpy(moved, x, self->count * sizeof *moved);
+    moved[i] = to;
+    return log_factor(self, x, effect) - log_factor(self, moved, effect);
+}
+
+/// Moves the number that a named effect changes along the travel, as far as its box allows, so that in the middle it is
+/// what it was before the effect was named (or what it is with it, when the name is taken back: sign -1).
+static void level(struct hypothesis *self, int effect, double sign)
+{
+    for (size_t i = 0; i < self->count; i++) {
+        size_t j = self->coordinates[i].effect == effect ? hypothesis_along(self, i) : self->count;
+        if (j == self->count)
+            continue;
+        const struct coordinate *c = &self->coordinates[j];
+        self->x[j] = fmin(fmax(self->x[j] - sign * log_factor(self, NULL, effect), c->lower), c->upper);
+        return;
+    }
+}
+
 void hypothesis_name(struct hypothesis *self, int effect, const double *values)
 {
     self->named[effect] = true;
@@ -240,10 +280,12 @@ void hypothesis_name(struct hypothesis *self, int effect, const double *values)
                 remove_coordinate(self, i);
     }
     add_nuisances(self);
+    level(self, effect, 1.0);
 }
 
 static void take_back(struct hypothesis *self, int effect)
 {
+    level(self, effect, -1.0);
     self->named[effect] = false;
     for (size_t i = self->count; i-- > 0;)
         if (self->coordinates[i].effect == effect)

@@ -37,6 +37,7 @@ struct hypothesis {
     bool gain_free;     ///< the input is no torque: its gain takes the place of a rigid body's inertia
     bool actuator_seen; ///< the recordings have a torque reference: what lies between it and the torque can show
     bool sensors_seen;  ///< position and speed were recorded by columns of their own: what one says of the other counts
+    double middle;      ///< of the travel: what is changed along it is named, and taken back, about there
     bool named[sim_effects_max];
     size_t count;
     struct coordinate coordinates[hypothesis_coordinates_max];
@@ -58,6 +59,13 @@ size_t hypothesis_claims(const struct hypothesis *self);
 
 /// Names an effect, its parameters starting at `values`.
 void hypothesis_name(struct hypothesis *self, int effect, const double *values);
+
+/// The coordinate of the number that coordinate i's effect changes along the travel, or the count if there is none.
+size_t hypothesis_along(const struct hypothesis *self, size_t i);
+
+/// By how much the logarithm of that number has to move when coordinate i goes from x[i] to `to`, so that in mid
+/// travel it is what it was.
+double hypothesis_along_shift(const struct hypothesis *self, const double *x, size_t i, double to);
 
 /// Takes a name back, and with it the names of effects that have nothing to act on without it; the parameters of the
 /// others keep their values.

@@ -11,9 +11,14 @@
 /// However far the axis goes, a belt keeps at least this share of its stiffness.
 static const double softest = 0.05;
 
+static double slope_along(const double *p, double position)
+{
+    return fmax(1.0 + p[0] * position, softest);
+}
+
 static void slope_bend(const double *p, const struct sim_motion *motion, struct sim_belt *io_belt)
 {
-    io_belt->stiffness *= fmax(1.0 + p[0] * motion->position, softest);
+    io_belt->stiffness *= slope_along(p, motion->position);
 }
 
 static bool slope_applies(const struct sim_model *model)
@@ -21,10 +26,10 @@ static bool slope_applies(const struct sim_model *model)
     return model->structure == sim_structure_two_mass;
 }
 
-/// A few percent over the covered travel, both ways.
+/// A few percent over the covered travel, or from th = 0 to where the axis is, both ways.
 static bool slope_scan(const struct sim_model *model, const struct sim_coverage *coverage, size_t index, double *out)
 {
-    static const double changes[] = {0.05, -0.05, 0.3, -0.3};
+    static const double changes[] = {0.02, -0.02, 0.2, -0.2};
     (void)model;
     if (index >= sizeof changes / sizeof changes[0])
         return false;
@@ -73,6 +78,8 @@ const struct sim_effect sim_effect_position_dependent_stiffness = {
                     .linear_maximum = 1e5,
                     .model_offset = SIZE_MAX}},
     .bend = slope_bend,
+    .along = slope_along,
+    .along_offset = offsetof(struct sim_model, belt_stiffness_Nm_per_rad),
     .applies = slope_applies,
     .scan = slope_scan,
     .testable = slope_testable,

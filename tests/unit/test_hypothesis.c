@@ -469,6 +469,37 @@ static void test_hypothesis_a_number_at_its_wall_is_within_its_bounds_to_the_las
     }
 }
 
+/// What is changed along the travel is changed about its middle: the belt there is as stiff as it was.
+static void test_hypothesis_naming_what_changes_along_the_travel_leaves_its_middle_alone(void)
+{
+    const double slope = 0.01, middle = 4.0, there = 60.0;
+    int effect = effect_of("position_dependent_stiffness");
+    struct sim_model model;
+    given.structure = sim_structure_two_mass;
+    given.belt_stiffness_Nm_per_rad = there;
+    hypothesis_init(&hypothesis, &given, false, true);
+    hypothesis.middle = middle;
+    hypothesis_name(&hypothesis, effect, &slope);
+    hypothesis_model(&hypothesis, NULL, &model);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9 * there, there, model.belt_stiffness_Nm_per_rad * (1.0 + slope * middle));
+    for (size_t i = 0; i < hypothesis.count; i++) {
+        if (hypothesis.coordinates[i].effect != effect)
+            continue;
+        size_t along = hypothesis_along(&hypothesis, i);
+        TEST_ASSERT_TRUE(along < hypothesis.count);
+        TEST_ASSERT_EQUAL_size_t(offsetof(struct sim_model, belt_stiffness_Nm_per_rad),
+                                 hypothesis.coordinates[along].model_offset);
+        double shift = hypothesis_along_shift(&hypothesis, hypothesis.x, i, 2.0 * hypothesis.x[i]);
+        hypothesis.x[along] += shift;
+        hypothesis.x[i] *= 2.0;
+    }
+    hypothesis_model(&hypothesis, NULL, &model);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9 * there, there, model.belt_stiffness_Nm_per_rad * (1.0 + 2.0 * slope * middle));
+    hypothesis_unname(&hypothesis, effect);
+    hypothesis_model(&hypothesis, NULL, &model);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9 * there, there, model.belt_stiffness_Nm_per_rad);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -484,6 +515,7 @@ int main(void)
     RUN_TEST(test_hypothesis_unnaming_gives_back_what_was_before);
     RUN_TEST(test_hypothesis_effects_come_and_go_in_any_order_and_keep_the_others_values);
     RUN_TEST(test_hypothesis_engaging_a_structure_frees_how_the_inertia_splits_and_unnaming_binds_it_again);
+    RUN_TEST(test_hypothesis_naming_what_changes_along_the_travel_leaves_its_middle_alone);
     RUN_TEST(test_hypothesis_does_not_name_what_the_given_model_has_on);
     RUN_TEST(test_hypothesis_deviations_are_the_scatter_of_the_parameters);
     RUN_TEST(test_hypothesis_deviations_of_amplitude_and_phase_hold_at_any_phase);

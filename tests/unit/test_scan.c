@@ -20,6 +20,8 @@ static struct evidence evidence;
 static struct fit_data data;
 static struct fit fit;
 static struct hypothesis hypothesis;
+static double centre; ///< of the motion
+static double swing;  ///< over what more than half a turn to either side takes
 static double columns[4][rows], block[4][samples];
 static double stranger_Nm; ///< of some lines that the torque has, and nothing moves by
 
@@ -32,6 +34,22 @@ void setUp(void)
     truth.viscous_friction_Nms_per_rad = 0.004;
     given = truth;
     stranger_Nm = 0.0;
+    centre = 0.0;
+    swing = 1.0;
+}
+
+/// An elastic axis with a resonance among the lines, which moves little and far from th = 0.
+static void make_elastic(void)
+{
+    truth.structure = sim_structure_two_mass;
+    truth.motor_inertia_kgm2 = 0.003;
+    truth.load_inertia_kgm2 = 0.002;
+    truth.belt_stiffness_Nm_per_rad = 60.0;
+    truth.belt_damping_Nms_per_rad = 0.04;
+    truth.sensors = (struct sim_sensors){.velocity_noise_rad_per_s = 1e-3, .torque_noise_Nm = 1e-3};
+    given = truth;
+    centre = 4.0;
+    swing = 0.02;
 }
 
 void tearDown(void)
@@ -44,11 +62,12 @@ void tearDown(void)
 static void command_at(size_t n, struct sim_command *out)
 {
     static const double lines[][2] = {{1.0, 30.0}, {7.0, 3.0}, {19.0, 3.0}, {41.0, 3.0}};
-    *out = (struct sim_command){.control = sim_control_cascade};
+    *out = (struct sim_command){.control = sim_control_cascade, .position = centre};
     for (size_t l = 0; l < sizeof lines / sizeof lines[0]; l++) {
         double w = two_pi * lines[l][0] * truth.sample_rate_hz / samples, angle = w * (double)n / truth.sample_rate_hz;
-        out->position += lines[l][1] / w * sin(angle);
-        out->velocity += lines[l][1] * cos(angle);
+        double speed = lines[l][1] * (l == 0 ? swing : 1.0);
+        out->position += speed / w * sin(angle);
+        out->velocity += speed * cos(angle);
     }
 }
 
@@ -66,7 +85,7 @@ static struct stretch stretch_of(double *const from[4], size_t length)
 static void record_and_fit(void)
 {
     static struct sim_belt_drive drive;
-    sim_belt_drive_init(&drive, &truth, 0.0);
+    sim_belt_drive_init(&drive, &truth, centre);
     memset(block, 0, sizeof block);
     for (size_t n = 0; n < rows; n++) {
         struct sim_command command;
@@ -91,12 +110,14 @@ static void record_and_fit(void)
         period_starts[p] = lead + p * samples;
     recording.block = stretch_of((double *const[]){block[0], block[1], block[2], block[3]}, samples);
     recording.all = stretch_of((double *const[]){columns[0], columns[1], columns[2], columns[3]}, rows);
-    recording.coverage = (struct sim_coverage){.position_span = 5.0, .torque_rms = 1.0, .duration_s = 2.0};
+    recording.coverage = (struct sim_coverage){
+        .position_span = 5.0 * swing, .position_mean = centre, .torque_rms = 1.0, .duration_s = 2.0};
     TEST_ASSERT_TRUE(evidence_init(&evidence, &recording, 0.005));
     TEST_ASSERT_TRUE(evidence_estimate_noise(&evidence, &truth));
     data = (struct fit_data){.runs = 1, .evidence = &evidence, .values = evidence.values};
     TEST_ASSERT_TRUE(fit_init(&fit, &data));
     hypothesis_init(&hypothesis, &given, false, true);
+    hypothesis.middle = centre;
     TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 10));
 }
 
@@ -165,11 +186,44 @@ static void test_search_names_nothing_where_the_best_is_a_small_part_of_far_too_
         TEST_ASSERT_FALSE_MESSAGE(hypothesis.named[e], sim_effects[e]->id);
 }
 
+/// A belt that gets stiffer along the travel is, where the axis is, mainly another stiffness: a short travel far from
+/// th = 0 shows it by what is left when that has been fitted, and slope and stiffness are found both.
+static void test_scan_finds_a_stiffness_slope_on_a_short_travel_far_from_the_origin(void)
+{
+    const double slope = 0.006;
+    int effect = sim_effect_find("position_dependent_stiffness");
+    for (int sign = -1; sign <= 1; sign += 2) {
+        struct scan scan;
+        struct scan_candidate candidate;
+        struct sim_model found;
+        double values[sim_effect_parameters_max], deviations[sim_effect_parameters_max];
+        setUp();
+        make_elastic();
+        truth.effect_on[effect] = true;
+        truth.effect_parameters[effect][0] = sign * slope;
+        record_and_fit();
+        TEST_ASSERT_TRUE(fit.cost > 2.0 * (double)data.values);
+        TEST_ASSERT_TRUE(scan_init(&scan, &data, &recording.coverage, &hypothesis, &fit));
+        TEST_ASSERT_TRUE(scan_effect(&scan, effect, 20.0, &candidate));
+        scan_free(&scan);
+        TEST_ASSERT_TRUE(fit_run(&fit, &data, &candidate.hypothesis, 10));
+        TEST_ASSERT_TRUE(fit.cost < 1.3 * (double)data.values);
+        hypothesis_parameters(&candidate.hypothesis, effect, fit.covariance, values, deviations);
+        hypothesis_model(&candidate.hypothesis, NULL, &found);
+        TEST_ASSERT_TRUE(deviations[0] < 0.1 * slope);
+        TEST_ASSERT_DOUBLE_WITHIN(4.0 * deviations[0], sign * slope, values[0]);
+        TEST_ASSERT_DOUBLE_WITHIN(0.3, truth.belt_stiffness_Nm_per_rad * (1.0 + sign * slope * centre),
+                                  found.belt_stiffness_Nm_per_rad * (1.0 + values[0] * centre));
+        tearDown();
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_scan_finds_an_encoder_out_of_true_at_any_phase);
     RUN_TEST(test_scan_finds_no_encoder_out_of_true_where_there_is_none);
     RUN_TEST(test_search_names_nothing_where_the_best_is_a_small_part_of_far_too_much);
+    RUN_TEST(test_scan_finds_a_stiffness_slope_on_a_short_travel_far_from_the_origin);
     return UNITY_END();
 }
