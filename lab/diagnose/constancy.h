@@ -6,10 +6,11 @@
 
 #include "lab/diagnose/fit.h"
 
-/// Evidence that a coordinate of a named effect that does not depend on time changes slowly over the periods: of all its
-/// coordinates and runs the largest.
+/// Evidence that a coordinate of a named effect that does not depend on time changes slowly over the periods: of all
+/// its coordinates and runs the largest.
 /// Equation:  nats = sum_q (sum_p c_q[p] (J . d_p) / |J|)^2 / 2,  d_p the contrasts (F18) that the fit leaves, J the
-///            mechanics of the coordinate's column of the Jacobian, c_q the slow courses (slow.h): chance gives 1/2 each
+///            mechanics of the coordinate's column of the Jacobian, c_q the slow courses (slow.h): chance gives 1/2
+///            each
 /// Range:     runs of four periods or more; 0 in others
 double constancy_nats(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit,
                       int effect);

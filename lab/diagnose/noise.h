@@ -42,7 +42,8 @@ bool evidence_init(struct evidence *self, const struct recording *recording, dou
 void evidence_free(struct evidence *self);
 
 /// Estimates the noise under a model: from the scatter of the periods' residuals about their mean, averaged over
-/// neighbouring bins, without slow courses over the periods where these stand out of it; in a run without periods from the smoothed spectrum of the residual itself, an upper bound.
+/// neighbouring bins, without slow courses over the periods where these stand out of it; in a run without periods from
+/// the smoothed spectrum of the residual itself, an upper bound.
 /// Equation:  C_k = 1 / (P (P-1)) sum_p (R_p - mean) (R_p - mean)^H, smoothed;  R = DFT / N
 ///            The whitening factor is smaller than C_k^-1 by what the few scatters behind an estimate make its inverse
 ///            too large.

@@ -31,8 +31,8 @@ void slow_along(const double *values, size_t stride, size_t periods, const doubl
 /// Equation: (n ln(S / n) - m ln(A / m) - (n - m) ln((S - A) / (n - m))) / 2,  A `part`, S `sum`; 0 if it is not larger
 double slow_larger_variance(double part, double m, double sum, double n, double *out_excess);
 
-/// Finds octaves in which the mechanics change slowly over the periods, by the present whitening, and writes per bin how
-/// many courses that is. What changes slowly is part of its own whitening then, but of that of the other courses as
+/// Finds octaves in which the mechanics change slowly over the periods, by the present whitening, and writes per bin
+/// how many courses that is. What changes slowly is part of its own whitening then, but of that of the other courses as
 /// well: it stands out all the same. Returns whether there are any.
 /// Range:  four periods or more; nothing is found in fewer
 /// Shapes: deviations: spectra of the periods' residuals less their mean, `stride` doubles each; out_orders: band + 1
