@@ -12,10 +12,18 @@ static bool delay_scan(const struct sim_model *model, const struct sim_coverage 
 {
     // The first: where a lag makes up for most of a delay, what remains of it is a small part of a sample.
     static const double samples[] = {0.06, 0.3, 0.7, 1.2, 1.8, 2.6, 3.6};
+    const size_t count = sizeof samples / sizeof samples[0];
+    // Among them, in order, what the model has already: it may be off by little, and across the instants at which a
+    // delayed torque changes within a sample no step leads back to it.
+    double given = model->dead_time_s * model->sample_rate_hz;
+    size_t below = 0, more = given > 0.0;
+    while (below < count && samples[below] < given)
+        below++;
     (void)coverage;
-    if (index >= sizeof samples / sizeof samples[0])
+    if (index >= count + more)
         return false;
-    out[0] = fmin(samples[index] / model->sample_rate_hz, sim_effect_dead_time.parameters[0].maximum);
+    double delay = more && index == below ? given : samples[index - (more && index > below)];
+    out[0] = fmin(delay / model->sample_rate_hz, sim_effect_dead_time.parameters[0].maximum);
     return true;
 }
 

@@ -431,6 +431,26 @@ static void test_effects_rise_of_friction_is_scanned_all_over_what_a_recording_c
     TEST_ASSERT_TRUE(3.0 * before > coverage.velocity_peak);
 }
 
+static void test_effects_scan_of_dead_time_goes_by_the_one_that_the_model_has(void)
+{
+    const struct sim_effect *effect = sim_effects[sim_effect_find("dead_time")];
+    struct sim_coverage coverage = coverage_of(false);
+    const double given[] = {0.0, 2e-5, 4.5e-4, 7e-4, 4.7e-3};
+    for (size_t i = 0; i < sizeof given / sizeof given[0]; i++) {
+        struct sim_model model = model_of(false, true, 1000.0);
+        double value, before = 0.0;
+        bool found = false;
+        model.dead_time_s = given[i];
+        for (size_t index = 0; effect->scan(&model, &coverage, index, &value); index++) {
+            TEST_ASSERT_TRUE(value >= before && value > 0.0);
+            found = found || fabs(value - given[i]) < 1e-12;
+            before = value;
+        }
+        TEST_ASSERT_EQUAL(given[i] > 0.0, found);
+        TEST_ASSERT_TRUE(before >= 3.6e-3); // the others are still there
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -448,5 +468,6 @@ int main(void)
     RUN_TEST(test_effects_of_no_size_oppose_nothing);
     RUN_TEST(test_effects_rise_of_friction_shows_between_the_slowest_and_the_largest_speed);
     RUN_TEST(test_effects_rise_of_friction_is_scanned_all_over_what_a_recording_can_show);
+    RUN_TEST(test_effects_scan_of_dead_time_goes_by_the_one_that_the_model_has);
     return UNITY_END();
 }
