@@ -198,18 +198,17 @@ static double off_by(double value, double ratio, struct truth_random *random)
     return value * (1.0 + truth_random_uniform(random, -ratio, ratio));
 }
 
-static void draw_nominal(struct truth_case *self, struct truth_random *random)
+// Put the given model's own numbers off by a few percent, always by the same ones for one state of `random`.
+static void put_off(struct truth_plant_spec *nominal, struct truth_random random)
 {
-    struct truth_plant_spec *nominal = &self->nominal;
-    *nominal = self->without;
-    nominal->motor_inertia_kgm2 = off_by(nominal->motor_inertia_kgm2, 0.015, random);
-    nominal->load_inertia_kgm2 = off_by(nominal->load_inertia_kgm2, 0.015, random);
-    nominal->viscous_friction_Nms_per_rad = off_by(nominal->viscous_friction_Nms_per_rad, 0.03, random);
-    nominal->coulomb_friction_Nm = off_by(nominal->coulomb_friction_Nm, 0.03, random);
-    nominal->torque_lag_s = off_by(nominal->torque_lag_s, 0.02, random);
-    nominal->dead_time_s = off_by(nominal->dead_time_s, 0.02, random);
-    nominal->belt_stiffness_Nm_per_rad = off_by(nominal->belt_stiffness_Nm_per_rad, 0.02, random);
-    nominal->belt_damping_Nms_per_rad = off_by(nominal->belt_damping_Nms_per_rad, 0.02, random);
+    nominal->motor_inertia_kgm2 = off_by(nominal->motor_inertia_kgm2, 0.015, &random);
+    nominal->load_inertia_kgm2 = off_by(nominal->load_inertia_kgm2, 0.015, &random);
+    nominal->viscous_friction_Nms_per_rad = off_by(nominal->viscous_friction_Nms_per_rad, 0.03, &random);
+    nominal->coulomb_friction_Nm = off_by(nominal->coulomb_friction_Nm, 0.03, &random);
+    nominal->torque_lag_s = off_by(nominal->torque_lag_s, 0.02, &random);
+    nominal->dead_time_s = off_by(nominal->dead_time_s, 0.02, &random);
+    nominal->belt_stiffness_Nm_per_rad = off_by(nominal->belt_stiffness_Nm_per_rad, 0.02, &random);
+    nominal->belt_damping_Nms_per_rad = off_by(nominal->belt_damping_Nms_per_rad, 0.02, &random);
 }
 
 static void draw_case(struct truth_case *self, int draw, struct truth_random *random)
@@ -262,6 +261,13 @@ static unsigned not_free(enum truth_kind kind)
     }
 }
 
+// What does much the same as the effect: below its corner a lag is a delay, and the given one may be off as well.
+static int find_stand_in(enum truth_kind kind, enum truth_refit *out)
+{
+    *out = kind == truth_kind_torque_lag ? truth_refit_dead_time : truth_refit_lag;
+    return kind == truth_kind_torque_lag || kind == truth_kind_dead_time;
+}
+
 static int find_evidence(struct truth_case *self, struct truth_evidence *scratch, int keep_basis)
 {
     unsigned fixed = 0u;
@@ -270,11 +276,21 @@ static int find_evidence(struct truth_case *self, struct truth_evidence *scratch
         fixed |= not_free(self->wish.kind[i]);
         aperiodic |= truth_kind_is_aperiodic(self->wish.kind[i]) && self->wish.kind[i] != truth_kind_lost_samples;
     }
-    const struct truth_evidence_setting setting = {
-        &self->controller, &self->fit, self->periods, truth_case_noise_seed(self), fixed, aperiodic, keep_basis};
+    struct truth_evidence_setting setting = {
+        .controller = &self->controller,
+        .excitation = &self->fit,
+        .periods = self->periods,
+        .seed = truth_case_noise_seed(self),
+        .not_free = fixed,
+        .aperiodic = aperiodic,
+        .keep_basis = keep_basis,
+    };
     for (int i = 0; i < self->wish.causes && !status; i++) {
         struct truth_drive other = truth_case_drive(self, all_known(self) & ~(1u << i));
-        truth_kind_refit(self->wish.kind[i], &self->truth.plant, &other.plant);
+        struct truth_plant_spec given = other.plant;
+        put_off(&given, self->errors);
+        truth_kind_refit(self->wish.kind[i], &self->truth.plant, &given, &other.plant);
+        setting.reach = find_stand_in(self->wish.kind[i], &setting.stand_in) ? TRUTH_REFIT_SHARE : 0.0;
         status = truth_evidence_find(&self->truth, &other, &setting, &scratch[i]);
         self->evidence_nats[i] = scratch[i].nats;
         self->share[i] = scratch[i].share;
@@ -296,7 +312,12 @@ static int find_evidence(struct truth_case *self, struct truth_evidence *scratch
 double truth_case_left_nats(const struct truth_case *self, const struct truth_drive *other)
 {
     const struct truth_evidence_setting setting = {
-        &self->controller, &self->fit, self->periods, truth_case_noise_seed(self), 0u, 1, 0};
+        .controller = &self->controller,
+        .excitation = &self->fit,
+        .periods = self->periods,
+        .seed = truth_case_noise_seed(self),
+        .aperiodic = 1,
+    };
     // Repeated rows are no matter of the motion: a drive with them is never the same as one without.
     if ((self->truth.sensors.lost_share > 0.0) != (other->sensors.lost_share > 0.0)) {
         return INFINITY;
@@ -445,6 +466,7 @@ void truth_case_make(struct truth_case *self, const struct truth_wish *wish)
     truth_random_init(&random, wish->seed, stream);
     for (int draw = 0; draw < DRAWS && !self->reached; draw++) {
         draw_case(self, draw, &random);
+        self->errors = random;
         int room = 1;
         for (int i = 0; i < wish->causes; i++) {
             room &= truth_kind_has_room(wish->kind[i], &self->setting);
@@ -452,5 +474,6 @@ void truth_case_make(struct truth_case *self, const struct truth_wish *wish)
         self->reached = wish->causes == 0 || (room && reach_size(self));
         compose(self);
     }
-    draw_nominal(self, &random);
+    self->nominal = self->without;
+    put_off(&self->nominal, self->errors);
 }

@@ -34,6 +34,7 @@ struct truth_case {
     struct truth_setting setting;
     struct truth_drive base;         ///< the drive before anything is hidden in it
     struct truth_drive truth;        ///< with all effects
+    struct truth_random errors;      ///< by how much the given model's own numbers are off is drawn from here
     struct truth_plant_spec without; ///< what is believed: without them
     struct truth_plant_spec nominal; ///< what is given to the diagnosis: `without`, a few percent off
     struct truth_controller controller;

@@ -154,8 +154,9 @@ static void follow_period(struct follower *self, const struct truth_run *run, st
     }
 }
 
-// Takes out of `io` what lies along the first `count` directions and gives it length one; 0 when nothing is left.
-static int make_direction(double basis[][VALUES], int count, double *io)
+// Takes out of `io` what lies along the first `count` directions and gives it length one; returns the length it had
+// then, 0 when nothing was left.
+static double make_direction(double basis[][VALUES], int count, double *io)
 {
     const double nothing = 1e-6;
     double before = sqrt(dot(io, io));
@@ -169,7 +170,7 @@ static int make_direction(double basis[][VALUES], int count, double *io)
     for (int i = 0; i < VALUES && length > 0.0; i++) {
         io[i] /= length;
     }
-    return length > nothing * before;
+    return length > nothing * before ? length : 0.0;
 }
 
 static void follow_second(const struct truth_plant_spec *plant, const struct truth_run *run, uint64_t seed,
@@ -184,29 +185,63 @@ static void follow_second(const struct truth_plant_spec *plant, const struct tru
     whiten(off, noise, out);
 }
 
-// Orthonormal basis of what the refit can do, on the second period.
-static int find_basis(const struct truth_plant_spec *other, const struct truth_run *run,
-                      const struct truth_evidence_setting *setting, const struct noise *noise, struct off *off,
-                      double basis[][VALUES])
+// How the residual changes with one value of the other model, per relative change by one; 0 where there is none.
+static int change_by(const struct truth_plant_spec *other, enum truth_refit which, const struct truth_run *run,
+                     uint64_t seed, const struct noise *noise, struct off *off, const double *base, double *out)
 {
     const double step = 0.01;
-    double base[VALUES];
-    int count = 0;
-    follow_second(other, run, setting->seed, noise, off, base);
-    for (int which = 0; which < truth_refit_count; which++) {
-        struct truth_plant_spec moved = *other;
-        double *value = refit_value(&moved, (enum truth_refit)which);
-        if ((setting->not_free >> which & 1u) || *value == 0.0) {
-            continue;
-        }
-        *value *= 1.0 + step;
-        follow_second(&moved, run, setting->seed, noise, off, basis[count]);
-        for (int i = 0; i < VALUES; i++) {
-            basis[count][i] -= base[i];
-        }
-        count += make_direction(basis, count, basis[count]);
+    struct truth_plant_spec moved = *other;
+    double *value = refit_value(&moved, which);
+    if (*value == 0.0) {
+        return 0;
     }
-    return count;
+    *value *= 1.0 + step;
+    follow_second(&moved, run, seed, noise, off, out);
+    for (int i = 0; i < VALUES; i++) {
+        out[i] = (out[i] - base[i]) / step;
+    }
+    return 1;
+}
+
+// Orthonormal basis of what the refit can do, on the second period. The direction of what stands in for the effect is
+// taken anew each time: it makes nearly the same residual, and what is left of that goes by the angle between the two.
+static void find_basis(const struct truth_plant_spec *other, const struct truth_run *run,
+                       const struct truth_evidence_setting *setting, const struct noise *noise, struct off *off,
+                       struct truth_evidence *out)
+{
+    double base[VALUES];
+    int count = 0, keep = setting->keep_basis, stands_in = setting->reach > 0.0;
+    if (!keep || stands_in) {
+        follow_second(other, run, setting->seed, noise, off, base);
+    }
+    for (int which = 0; !keep && which < truth_refit_count; which++) {
+        if (!(setting->not_free >> which & 1u) &&
+            change_by(other, (enum truth_refit)which, run, setting->seed, noise, off, base, out->refit[count])) {
+            count += make_direction(out->refit, count, out->refit[count]) > 0.0;
+        }
+    }
+    out->refits = keep ? out->refits : count;
+    out->stand_in_size = 0.0;
+    if (stands_in && change_by(other, setting->stand_in, run, setting->seed, noise, off, base, out->stand_in)) {
+        out->stand_in_size = make_direction(out->refit, out->refits, out->stand_in);
+    }
+}
+
+// Take from the residual what the refit can explain of it.
+static void take_refit(const struct truth_evidence_setting *setting, int looked_at, struct truth_evidence *io)
+{
+    for (int k = 0; k <= io->refits; k++) {
+        const double *direction = k < io->refits ? io->refit[k] : io->stand_in;
+        double along = k < io->refits || io->stand_in_size > 0.0 ? dot(direction, io->residual) : 0.0, taken = along;
+        if (k == io->refits) {
+            double most = setting->reach * io->stand_in_size;
+            taken = fmax(-most, fmin(most, along));
+        }
+        io->nats -= 0.5 * looked_at * taken * (2.0 * along - taken);
+        for (int i = 0; i < VALUES && taken != 0.0; i++) {
+            io->residual[i] -= taken * direction[i];
+        }
+    }
 }
 
 static double torque_share(const struct off *off, const struct truth_run *run, int first)
@@ -260,17 +295,9 @@ int truth_evidence_find(const struct truth_drive *truth, const struct truth_driv
     if (!status) {
         find_noise(truth, noise);
         sum_up(&plant, &run, setting, noise, off, out);
-        if (!setting->keep_basis) {
-            out->refits = find_basis(&plant, &run, setting, noise, off, out->refit);
-        }
+        find_basis(&plant, &run, setting, noise, off, out);
         int looked_at = run.periods - 1;
-        for (int k = 0; k < out->refits; k++) {
-            double along = dot(out->refit[k], out->residual);
-            out->nats -= 0.5 * looked_at * along * along;
-            for (int i = 0; i < VALUES; i++) {
-                out->residual[i] -= along * out->refit[k][i];
-            }
-        }
+        take_refit(setting, looked_at, out);
         out->nats *= (double)(setting->periods - 1) / looked_at;
     }
     truth_run_free(&run);

@@ -384,29 +384,27 @@ static double moved(double from, double to, double ratio)
     return from + fmax(-ratio * from, fmin(ratio * from, to - from));
 }
 
-void truth_kind_refit(enum truth_kind kind, const struct truth_plant_spec *truth, struct truth_plant_spec *io_plant)
+void truth_kind_refit(enum truth_kind kind, const struct truth_plant_spec *truth, const struct truth_plant_spec *given,
+                      struct truth_plant_spec *io_plant)
 {
-    const double usual = 0.10, of_load = 0.05, of_belt = 0.08;
+    const double usual = TRUTH_REFIT_SHARE, of_load = 0.05, of_belt = 0.08;
     if (kind == truth_kind_viscous_friction) {
         io_plant->viscous_friction_Nms_per_rad =
-            moved(io_plant->viscous_friction_Nms_per_rad, truth->viscous_friction_Nms_per_rad, usual);
+            moved(given->viscous_friction_Nms_per_rad, truth->viscous_friction_Nms_per_rad, usual);
     } else if (kind == truth_kind_coulomb_friction) {
-        io_plant->coulomb_friction_Nm = moved(io_plant->coulomb_friction_Nm, truth->coulomb_friction_Nm, usual);
+        io_plant->coulomb_friction_Nm = moved(given->coulomb_friction_Nm, truth->coulomb_friction_Nm, usual);
     } else if (kind == truth_kind_inertia) {
-        io_plant->load_inertia_kgm2 = moved(io_plant->load_inertia_kgm2, truth->load_inertia_kgm2, of_load);
+        io_plant->load_inertia_kgm2 = moved(given->load_inertia_kgm2, truth->load_inertia_kgm2, of_load);
     } else if (kind == truth_kind_torque_lag) {
-        io_plant->torque_lag_s = moved(io_plant->torque_lag_s, truth->torque_lag_s, usual);
-        // Below its corner a lag is a delay, and the given delay may be off as well.
-        double rest = truth->torque_lag_s - io_plant->torque_lag_s;
-        io_plant->dead_time_s = moved(io_plant->dead_time_s, io_plant->dead_time_s + rest, usual);
+        io_plant->torque_lag_s = moved(given->torque_lag_s, truth->torque_lag_s, usual);
+        io_plant->dead_time_s = given->dead_time_s;
     } else if (kind == truth_kind_dead_time) {
-        io_plant->dead_time_s = moved(io_plant->dead_time_s, truth->dead_time_s, usual);
-        double rest = truth->dead_time_s - io_plant->dead_time_s;
-        io_plant->torque_lag_s = moved(io_plant->torque_lag_s, io_plant->torque_lag_s + rest, usual);
+        io_plant->dead_time_s = moved(given->dead_time_s, truth->dead_time_s, usual);
+        io_plant->torque_lag_s = given->torque_lag_s;
     } else if (kind == truth_kind_position_dependent_stiffness) { // about its middle, where the belt may be off anyhow
         double there = 1.0 + truth->stiffness_slope_per_rad * truth->coulomb_origin_rad;
         io_plant->belt_stiffness_Nm_per_rad =
-            moved(io_plant->belt_stiffness_Nm_per_rad, there * truth->belt_stiffness_Nm_per_rad, of_belt);
+            moved(given->belt_stiffness_Nm_per_rad, there * truth->belt_stiffness_Nm_per_rad, of_belt);
     }
 }
 

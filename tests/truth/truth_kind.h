@@ -89,9 +89,13 @@ int truth_kind_has_room(enum truth_kind kind, const struct truth_setting *settin
 /// it takes it for (not known).
 void truth_kind_apply(const struct truth_hidden *hidden, const struct truth_setting *setting, int known,
                       struct truth_drive *io_drive);
-/// Move the value that the effect gives in `io_plant` towards that of `truth` by what a refit of the given model may
-/// (10 %, load inertia 5 %, belt 8 %), and with it what would stand in for it: lag for dead time and the reverse.
-void truth_kind_refit(enum truth_kind kind, const struct truth_plant_spec *truth, struct truth_plant_spec *io_plant);
+#define TRUTH_REFIT_SHARE 0.10
+
+/// Set the value that the effect gives to what comes nearest to that of `truth` of all that a refit of the `given`
+/// model may (10 % about it, load inertia 5 %, belt 8 %), and with it what would stand in for it: lag for dead time and
+/// the reverse.
+void truth_kind_refit(enum truth_kind kind, const struct truth_plant_spec *truth, const struct truth_plant_spec *given,
+                      struct truth_plant_spec *io_plant);
 
 struct truth_parameter {
     const char *name;

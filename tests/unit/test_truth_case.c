@@ -260,6 +260,45 @@ static void test_truth_evidence_leaves_out_what_a_refit_takes_up(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.01 * evidence.nats, 0.0, refitted);
 }
 
+static void test_truth_evidence_lets_what_stands_in_move_within_its_reach(void)
+{
+    struct truth_evidence_setting setting = plain_setting();
+    struct truth_drive late = made.truth;
+    made.truth.plant.torque_lag_s = late.plant.torque_lag_s = 5e-4;
+    made.truth.plant.dead_time_s = 4e-4;
+    late.plant.dead_time_s = 4.2e-4;
+    setting.not_free = 1u << truth_refit_lag | 1u << truth_refit_dead_time;
+    TEST_ASSERT_EQUAL_INT(0, truth_evidence_find(&made.truth, &late, &setting, &evidence));
+    double unmoved = evidence.nats;
+    setting.stand_in = truth_refit_dead_time;
+    setting.reach = 0.01; // 0.0042 of the 0.02 ms that it is off: 0.79 of the residual are left, in nats the square
+    TEST_ASSERT_EQUAL_INT(0, truth_evidence_find(&made.truth, &late, &setting, &evidence));
+    TEST_ASSERT_TRUE(unmoved > 100.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.05 * unmoved, 0.624 * unmoved, evidence.nats);
+    setting.reach = 0.1; // farther than it needs
+    TEST_ASSERT_EQUAL_INT(0, truth_evidence_find(&made.truth, &late, &setting, &evidence));
+    TEST_ASSERT_DOUBLE_WITHIN(0.01 * unmoved, 0.0, evidence.nats);
+}
+
+/// What is asked for is evidence over the model that is given, whose own numbers are off as well.
+static void test_truth_case_measures_a_size_from_the_given_model(void)
+{
+    for (uint64_t seed = 31u; seed < 34u; seed++) {
+        make(truth_kind_viscous_friction, truth_size_faint, seed);
+        double given = made.nominal.viscous_friction_Nms_per_rad, real = made.truth.plant.viscous_friction_Nms_per_rad;
+        struct truth_drive best = made.truth;
+        TEST_ASSERT_TRUE(fabs(real / given - 1.0) > TRUTH_REFIT_SHARE);
+        best.plant.viscous_friction_Nms_per_rad = given * (1.0 + copysign(TRUTH_REFIT_SHARE, real - given));
+        struct truth_evidence_setting setting = {.controller = &made.controller,
+                                                 .excitation = &made.fit,
+                                                 .periods = made.periods,
+                                                 .seed = truth_case_noise_seed(&made),
+                                                 .not_free = 1u << truth_refit_viscous};
+        TEST_ASSERT_EQUAL_INT(0, truth_evidence_find(&made.truth, &best, &setting, &evidence));
+        TEST_ASSERT_DOUBLE_WITHIN(0.05 * evidence.nats, evidence.nats, made.evidence_nats[0]);
+    }
+}
+
 static void test_truth_evidence_of_a_bias_is_that_of_a_mean(void)
 {
     struct truth_evidence_setting setting = plain_setting();
@@ -381,6 +420,8 @@ int main(void)
     RUN_TEST(test_truth_case_given_its_own_parameters_is_not_short_of_the_truth);
     RUN_TEST(test_truth_evidence_is_nothing_between_equal_drives);
     RUN_TEST(test_truth_evidence_leaves_out_what_a_refit_takes_up);
+    RUN_TEST(test_truth_evidence_lets_what_stands_in_move_within_its_reach);
+    RUN_TEST(test_truth_case_measures_a_size_from_the_given_model);
     RUN_TEST(test_truth_evidence_of_a_bias_is_that_of_a_mean);
     RUN_TEST(test_truth_evidence_of_an_encoder_is_that_of_two_columns_that_differ);
     RUN_TEST(test_truth_run_eccentric_encoder_shows_a_wave_per_turn);
