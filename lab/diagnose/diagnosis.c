@@ -709,6 +709,7 @@ static bool pass_judgement(struct work *w, struct diagnosis *d, const struct hyp
         .mean_rms = d->extended.mean_rms,
         .worse =
             error > clearly * d->noise_floor_nrmse && (error > clearly * d->refitted.validation_nrmse || error > none),
+        .astray = w->recordings[w->fit_count].periodic && judge_is_astray(error, d->noise_floor_nrmse),
     };
     if (!judge_structure(&w->validate_data, &d->extended_model, &seen.over_time) ||
         !judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, &seen, out_judgement))

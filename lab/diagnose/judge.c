@@ -308,7 +308,8 @@ static enum blackbox_group one_gap(const struct blackbox *box, const struct fit_
 
 /// What the mean of the periods leaves, held against the black box. io_rest: the whitened residual on entry, what the
 /// black box leaves of it on return.
-static void judge_mean(const struct bench *b, double validation_rms, bool worse, double *io_rest, struct judgement *j)
+static void judge_mean(const struct bench *b, const struct judge_validation *validation, double *io_rest,
+                       struct judgement *j)
 {
     bool named = hypothesis_claims(b->hypothesis) > 0;
     // Beside a given model a right answer leaves noise, and that nothing is wrong is the boldest answer of all. Without
@@ -318,11 +319,14 @@ static void judge_mean(const struct bench *b, double validation_rms, bool worse,
                                                         : 1.15,
                  visible = 1.12;    // a third of the noise's amplitude
     const double seen_again = 1.03; // on data the fit has not seen: chance does not come twice
+    const double validation_rms = validation->mean_rms;
+    // Without a given model nothing says how good the structure itself is.
+    bool astray = validation->astray && !b->hypothesis->inertia_free;
     double left, values = (double)b->data->values, columns = (double)b->box->columns;
     j->leftover = blackbox_gain(b->box, b->data, b->hypothesis, b->fit, blackbox_all, &left, io_rest);
     double chance = 0.5 * columns + 12.0 * sqrt(0.5 * columns);
     bool structured = j->leftover / fmax(left / values, 1.0) > chance && b->fit->cost > visible * left;
-    j->unexplained = worse || (structured && !(validation_rms < seen_again)) ||
+    j->unexplained = validation->worse || astray || (structured && !(validation_rms < seen_again)) ||
                      b->fit->cost / values > too_much * too_much || !(validation_rms < too_much);
     j->of_mean = j->unexplained;
     if (j->unexplained) {
@@ -365,7 +369,7 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
     }
     const struct bench bench = {&box, data, coverage, hypothesis, fit};
     memcpy(rest, fit->residual, data->values * sizeof *rest);
-    judge_mean(&bench, validation->mean_rms, validation->worse, rest, out_judgement);
+    judge_mean(&bench, validation, rest, out_judgement);
     bool good = look_over_time(data, fit, rest, &over_time);
     if (good) {
         structure_merge(&over_time, &validation->over_time);
@@ -442,6 +446,12 @@ bool judge_is_vague(const struct sim_effect *effect, const double *values, const
             return false;
     }
     return true;
+}
+
+bool judge_is_astray(double error, double noise_floor)
+{
+    const double much = 1.25, least = 0.003; // twice the share of the torque that is worth a name
+    return error > much * noise_floor && error * error - noise_floor * noise_floor > least * least;
 }
 
 bool judge_distance(double error, double noise_floor, struct judgement *io_judgement)

@@ -22,6 +22,7 @@ struct judgement {
 struct judge_validation {
     double mean_rms;            ///< diagnosis_figures
     bool worse;                 ///< it errs more there than the refitted model
+    bool astray;                ///< judge_is_astray
     struct structure over_time; ///< that it leaves there
 };
 
@@ -29,7 +30,7 @@ struct judge_validation {
 /// Unexplained: the black box gains more than chance allows (its expected gain plus twelve standard deviations) and
 /// more than a third of the noise in amplitude, or one group of it does as well as three names, or the residual on fit
 /// or validation data is a quarter larger than the noise (half as large again without a given model, a seventh where
-/// nothing is named), or periods differ beyond chance.
+/// nothing is named), or its torque goes astray, or periods differ beyond chance.
 /// A name stands if it explains a visible share of the torque and, where something stays unexplained, far more than
 /// what stays and more than the black box can do without it.
 /// Errors: false if memory is short.
@@ -41,6 +42,10 @@ bool judge(const struct fit_data *data, const struct sim_coverage *coverage, con
 /// explained; and where noise is larger than all that was measured, no name stands. Returns whether it changed the
 /// judgement.
 bool judge_distance(double error, double noise_floor, struct judgement *io_judgement);
+
+/// Whether a model errs more on unseen data than noise makes it, by a quarter and by more than a name is worth. Weights
+/// take little notice where noise, or what is allowed for, hides most of a residual; torque does.
+bool judge_is_astray(double error, double noise_floor);
 
 /// Whether an effect's size is not known: every parameter but phases, of a sinusoid its amplitude alone, lies within
 /// two of its deviations of nothing, or of the given model's value.

@@ -236,12 +236,14 @@ static void differentiate(size_t bins, size_t samples, double factor, size_t ord
     }
 }
 
-/// Nobody's torque and speed columns are of the same instant to the microsecond: a skew s makes s jw T. And a speed
+/// Nobody's torque and speed columns are of the same instant to the last digit: a skew s makes s jw T. What one
+/// interrupt latches is a conversion apart, a thousandth of a sample; more would take whatever torque and motion say
+/// differently about a delay for a skew. And a speed
 /// that is the derivative of samples is wrong by some (w h)^2 / 12 of it, (w h)^4 / 120 and smaller terms, too large or
 /// late, by how the torque changed between them.
 static void make_allowances(struct evidence *self)
 {
-    const double together = 0.005, apart = 1.0; // of a sample; without a reference the torque may be a held command
+    const double together = 0.001, apart = 1.0; // of a sample; without a reference the torque may be a held command
     const struct recording *r = self->recording;
     size_t bins = r->band + 1, n = r->block.samples;
     double *shape = self->work + 6 * n, *nothing = shape + 2 * bins;

@@ -65,6 +65,15 @@ static void test_judge_error_far_above_the_noise_is_not_explained(void)
     TEST_ASSERT_TRUE(judgement.stands[3]);
 }
 
+static void test_judge_torque_that_noise_does_not_make_is_astray(void)
+{
+    TEST_ASSERT_TRUE(judge_is_astray(0.0179, 0.0101));
+    TEST_ASSERT_FALSE(judge_is_astray(0.0123, 0.0101)); // less than a quarter more
+    TEST_ASSERT_TRUE(judge_is_astray(0.0127, 0.0101 - 1e-6));
+    TEST_ASSERT_FALSE(judge_is_astray(0.0029, 0.0018)); // beyond the noise less than a name is worth
+    TEST_ASSERT_FALSE(judge_is_astray(NAN, 0.01));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -73,5 +82,6 @@ int main(void)
     RUN_TEST(test_judge_size_of_a_ripple_is_its_amplitude);
     RUN_TEST(test_judge_noise_larger_than_the_torque_lets_no_name_stand);
     RUN_TEST(test_judge_error_far_above_the_noise_is_not_explained);
+    RUN_TEST(test_judge_torque_that_noise_does_not_make_is_astray);
     return UNITY_END();
 }

@@ -355,6 +355,31 @@ static void test_noise_of_a_run_without_periods_comes_from_its_own_residual(void
         assert_uncorrelated(0, distance);
 }
 
+/// Sum of the whitened squares of a torque column that is late by so much of a sample.
+static double squares_of_skew(double late)
+{
+    static double nothing[samples], actuator[samples];
+    for (size_t i = 0; i < samples; i++) {
+        double slow = two_pi * 5.0 / samples, fast = two_pi * 40.0 / samples;
+        actuator[i] = late * (0.3 * slow * cos(slow * (double)i) - 0.2 * fast * sin(fast * (double)i));
+    }
+    evidence_whiten(&evidence, nothing, actuator, whitened);
+    double sum = 0.0;
+    for (size_t i = 0; i < evidence.values; i++)
+        sum += whitened[i] * whitened[i];
+    return sum;
+}
+
+static void test_noise_allows_for_a_thousandth_of_a_sample_between_columns_and_no_more(void)
+{
+    const double deviation = 0.001; // of the skew that is allowed for
+    record(&(struct noise){.mechanics = 2e-5, .actuator = 2e-5}, 11u, 12);
+    prepare(12, true);
+    // The columns' noise is so small that all that is left of a skew is its size over that deviation.
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, 1.0, squares_of_skew(deviation));
+    TEST_ASSERT_DOUBLE_WITHIN(5.0, 100.0, squares_of_skew(10.0 * deviation));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -367,5 +392,6 @@ int main(void)
     RUN_TEST(test_noise_transform_is_the_dft_over_the_length);
     RUN_TEST(test_noise_of_few_periods_leaves_a_perfect_model_at_one);
     RUN_TEST(test_noise_of_a_run_without_periods_comes_from_its_own_residual);
+    RUN_TEST(test_noise_allows_for_a_thousandth_of_a_sample_between_columns_and_no_more);
     return UNITY_END();
 }
