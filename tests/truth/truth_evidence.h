@@ -29,9 +29,9 @@ enum truth_refit {
 ///
 /// Evidence is half the sum of squares of all three over their noise, over the periods counted (all but the first) and
 /// the lines up to TRUTH_EVIDENCE_LINES, after the part that the given model's own parameters can take up, linearly and
-/// without limits, has been projected out, and the one that would stand in for the effect has been put where it takes up
-/// most within its reach. It is the log-likelihood ratio that a detector reaches which knows the noise and the effect:
-/// Neyman and Pearson's limit.
+/// without limits, has been projected out, and the one that would stand in for the effect has been put where it takes
+/// up most within its reach. It is the log-likelihood ratio that a detector reaches which knows the noise and the
+/// effect: Neyman and Pearson's limit.
 /// Lost rows are counted instead: a value repeated to the last digit is worth the logarithm of noise over resolution.
 struct truth_evidence_setting {
     const struct truth_controller *controller;
