@@ -122,19 +122,27 @@ struct course {
     int direction; ///< of the motor's motion, +1 or -1; 0: it is held
     double from;   ///< motor position at which the friction was `bristle` and its level `level`
     double bristle, level;
+    double missing, power; ///< share of that level that was missing, and its power 1 - n: at a level that stays
 };
+
+/// Whether friction builds up as an exponential does.
+static bool is_exponential(const struct sim_stepper *stepper)
+{
+    const double same = 1e-6;
+    return fabs(stepper->build_up_exponent - 1.0) < same;
+}
 
 /// Share that is left, after a way in distances, of what was missing: dr/dx = -r^n of r times the level. With n below 1
 /// it comes to an end.
-static double left_missing(double missing, double way, double exponent)
+static double left_missing(const struct course *course, double missing, double way)
 {
-    const double same = 1e-6;
-    if (fabs(exponent - 1.0) < same)
+    if (is_exponential(course->stepper))
         return exp(-way);
     if (!(missing > 0.0 && isfinite(missing)))
         return 0.0;
-    double power = 1.0 - exponent, left = pow(missing, power) - power * way;
-    return left > 0.0 ? pow(left, 1.0 / power) / missing : 0.0;
+    double exponent = 1.0 - course->stepper->build_up_exponent;
+    double left = (missing == course->missing ? course->power : pow(missing, exponent)) - exponent * way;
+    return left > 0.0 ? pow(left, 1.0 / exponent) / missing : 0.0;
 }
 
 /// Friction that builds up, its level straight from where the step began to here: what was missing fades with the way,
@@ -145,7 +153,7 @@ static double built_up(const struct course *course, double position, double dry)
     if (!(way > 0.0))
         return course->bristle;
     double faded = -expm1(-way), missing = course->bristle - course->level;
-    double left = left_missing(fabs(missing) / dry, way, course->stepper->build_up_exponent);
+    double left = left_missing(course, fabs(missing) / dry, way);
     return level - (level - course->level) * faded / way + missing * left;
 }
 
@@ -163,6 +171,15 @@ static double dry_level(const struct state *s, const struct sim_stepper *stepper
     double dry;
     driving_torque(s, stepper, 0.0, 0.0, direction, &dry);
     return dry;
+}
+
+/// The level of friction that builds up where the step starts, and what is missing of it.
+static void take_level(struct course *io, double dry)
+{
+    io->level = io->direction * dry;
+    io->missing = fabs(io->bristle - io->level) / dry;
+    if (!is_exponential(io->stepper))
+        io->power = pow(io->missing, 1.0 - io->stepper->build_up_exponent);
 }
 
 // ---- Runge-Kutta steps
@@ -206,10 +223,10 @@ static void add(struct rates *io_sum, const struct rates *r, size_t masses, doub
 static void runge_kutta(const struct state *from, const struct sim_stepper *stepper, double torque, int direction,
                         double dt_s, struct state *out)
 {
-    struct course course = {stepper, torque, direction, from->position[0], from->bristle, 0.0};
+    struct course course = {stepper, torque, direction, from->position[0], from->bristle, 0.0, 0.0, 0.0};
     bool builds_up = stepper->build_up > 0.0 && direction != 0;
     if (builds_up)
-        course.level = direction * dry_level(from, stepper, direction);
+        take_level(&course, dry_level(from, stepper, direction));
     size_t masses = stepper->chain.masses;
     struct rates sum, r; // of the masses that there are
     struct state at;
@@ -444,11 +461,26 @@ static void step_belt(struct state *io, const struct sim_stepper *stepper, doubl
         step_through_edges(io, stepper, torque, dt_s / parts);
 }
 
+/// Of the rate: a look ahead is as good with longer steps.
+static const double quick_share = 0.7;
+
 /// Rate that friction which builds up asks for: of the motor swinging on it, and of the way in which it does so.
 static double bristle_rate(const struct state *s, const struct sim_stepper *stepper, double dry)
 {
     double swing = sqrt(dry / (stepper->build_up * stepper->chain.inertia[0]));
     return fmax(swing, 0.5 * fabs(s->velocity[0]) / stepper->build_up);
+}
+
+/// The same, of a look ahead, where what counts is the torque: friction that is nearly built up is a soft spring, and
+/// little changes. In a step in which the motor may turn back that is as hard as in the direction in which it is harder.
+static double quick_bristle_rate(const struct state *s, const struct sim_stepper *stepper, double dry, double dt_s)
+{
+    double speed = fabs(s->velocity[0]) / stepper->build_up, missing = 1.0 - sign_of(s->velocity[0]) * s->bristle / dry;
+    bool runs_on = speed * dt_s > 1.0;
+    missing = runs_on ? fmax(missing, 0.0) : fmax(missing, 2.0 - missing);
+    double slope = is_exponential(stepper) ? missing : pow(missing, stepper->build_up_exponent);
+    double swing = sqrt(slope * dry / (stepper->build_up * stepper->chain.inertia[0]));
+    return quick_share * fmax(swing, 0.5 * slope * speed);
 }
 
 /// Where friction is built up and the motor runs on, one step will do. Returns whether it did.
@@ -475,9 +507,10 @@ static void step_finely(struct state *io, const struct sim_stepper *stepper, dou
         dry = dry_level(io, stepper, sign_of(io->velocity[0]));
         if (!bent && steps == 1 && slide(io, stepper, torque, dry, whole_s))
             return;
-        size_t swings = sim_stepper_inner_steps(bristle_rate(io, stepper, dry), whole_s);
         // Looking ahead, friction that builds up within a fraction of a step is as good as friction that switches.
         const size_t quick_most = 8;
+        double rate = stepper->quick ? quick_bristle_rate(io, stepper, dry, whole_s) : bristle_rate(io, stepper, dry);
+        size_t swings = sim_stepper_inner_steps(rate, whole_s);
         swings = stepper->quick && swings > quick_most ? quick_most : swings;
         steps = swings > steps ? swings : steps;
     }
@@ -554,9 +587,58 @@ static double opposing_torque(const struct state *s, const struct sim_stepper *s
     return o.smooth + factor * (o.viscous + direction * o.dry) - linear * motion.velocity;
 }
 
+/// Whether friction that builds up changes so little over a step that it counts as it is half way, and is no spring on
+/// which the motor would swing meanwhile.
+static bool builds_up_slowly(const struct course *course, const struct state *from)
+{
+    const double small = 0.01, built_up = 3.0;
+    const struct sim_stepper *stepper = course->stepper;
+    if (!(course->missing > 0.0))
+        return true;
+    double slope = is_exponential(stepper) ? course->missing : course->missing / course->power;
+    double distances = stepper->dt_s / stepper->build_up, way = distances * fabs(from->velocity[0]);
+    double swing = slope * distances * stepper->dt_s * fabs(course->level) / stepper->chain.inertia[0];
+    return fmin(slope * way, built_up * course->missing) < small && swing < small;
+}
+
+/// The whole step at once where friction builds up and the motor runs on: friction counts as it is half way. Returns
+/// false, with nothing moved, if that is not good enough.
+static bool slide_at_once(struct state *io, const struct sim_stepper *stepper, double torque)
+{
+    const double still = 1e-3;
+    int direction = sign_of(io->velocity[0]);
+    struct course course = {stepper, torque, direction, io->position[0], io->bristle, 0.0, 0.0, 0.0};
+    double half_s = 0.5 * stepper->dt_s, link[sim_masses_max] = {0.0}, dry;
+    if (stepper->chain.masses > 1)
+        link_torques(io, stepper, link);
+    double net = driving_torque(io, stepper, torque, link[0], direction, &dry) - io->bristle;
+    take_level(&course, dry);
+    if (direction == 0 || !builds_up_slowly(&course, io))
+        return false;
+    struct state half = *io, next = *io;
+    double gained = half_s * net / stepper->chain.inertia[0];
+    half.position[0] += half_s * (half.velocity[0] + 0.5 * gained);
+    half.velocity[0] += gained;
+    half.time_s += half_s;
+    double linear = steady_factor(stepper, direction) * stepper->model.viscous_friction_Nms_per_rad, half_dry;
+    double driving = driving_torque(&half, stepper, torque, 0.0, direction, &half_dry);
+    // A law that is no exponential does not follow a level that moves in one step.
+    if (!is_exponential(stepper) && fabs(half_dry - dry) > still * dry)
+        return false;
+    double friction = built_up(&course, half.position[0], half_dry);
+    transit(io, stepper, direction, driving + linear * half.velocity[0] - friction, &next);
+    if (!(direction * next.velocity[0] > 0.0))
+        return false;
+    next.bristle = built_up(&course, next.position[0], fmax(2.0 * half_dry - dry, 0.0)); // its level straight on
+    *io = next;
+    return true;
+}
+
 /// The whole step at once. Returns false, with nothing moved, if the motor reverses or breaks away meanwhile.
 static bool step_at_once(struct state *io, const struct sim_stepper *stepper, double torque)
 {
+    if (stepper->build_up > 0.0)
+        return slide_at_once(io, stepper, torque);
     int direction = stepper->one_way ? 1 : sign_of(io->velocity[0]);
     if (direction == 0)
         direction = breakaway(io, stepper, torque);

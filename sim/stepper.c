@@ -120,7 +120,7 @@ static void init(struct sim_stepper *self, const struct sim_model *model, double
     prepare_actuator(self);
     self->quick = quick;
     self->exact = self->oppose.count == 0 && self->bend.count == 0 && !(self->build_up > 0.0);
-    self->split = self->exact || (quick && self->bend.count == 0 && !(self->build_up > 0.0));
+    self->split = self->exact || (quick && self->bend.count == 0);
     if (!self->split)
         return;
     self->one_way =

@@ -69,7 +69,8 @@ void sim_stepper_init(struct sim_stepper *self, const struct sim_model *model, d
 
 /// The same for many short looks ahead from measured states: effects on the motor that are not linear are taken at each
 /// step as they are half way through it, the linear parts exactly. A third of the work; every friction and ripple
-/// together were off by 1e-4 Nm of 0.5 Nm. A belt that is not linear is integrated as ever.
+/// together were off by 1e-4 Nm of 0.5 Nm. Friction that builds up counts so, too, where it changes little over a step;
+/// where it does not, steps are as fine as its torque asks for. A belt that is not linear is integrated as ever.
 void sim_stepper_init_quick(struct sim_stepper *self, const struct sim_model *model, double dt_s);
 
 /// The same without what only pays over many steps: every step is integrated numerically.

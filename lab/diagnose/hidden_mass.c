@@ -43,6 +43,16 @@ double hidden_mass_credible_cost(const struct fit_data *data, double cost)
     return fmax(cost, values - twentieth * sqrt(2.0 * values));
 }
 
+/// The same without derivatives and covariance where it ends, given up where `goal` is out of reach: for the cost only.
+static bool fit_for_cost(struct fit_data *data, struct evidence *evidence, struct fit *fit, double goal,
+                         struct hypothesis *io_hypothesis)
+{
+    data->renewed = evidence;
+    bool good = fit_roughly(fit, data, NULL, NULL, io_hypothesis, iterations, goal);
+    data->renewed = NULL;
+    return good;
+}
+
 /// What the noise depends on: the numbers of the structure, and the inertias between which it divides.
 static bool is_of_structure(const struct coordinate *c)
 {
@@ -104,7 +114,7 @@ static void try_structure(struct fit_data *data, struct evidence *evidence, cons
         struct hypothesis trial = *before;
         sim_effects[effect]->scan(&model, coverage, eighths[i] * total / 8, values);
         hypothesis_name(&trial, effect, values);
-        if (hidden_mass_concerns(data, &trial) && hidden_mass_fit(data, evidence, fit, &trial) &&
+        if (hidden_mass_concerns(data, &trial) && fit_for_cost(data, evidence, fit, *io_cost, &trial) &&
             fit->cost < *io_cost) {
             *io_cost = fit->cost;
             *io_best = trial;

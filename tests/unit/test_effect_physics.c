@@ -164,6 +164,62 @@ static void test_presliding_follows_its_equation_through_reversals(void)
 }
 
 /// Under a torque below its level it holds: the motor comes to rest where the spring holds the torque.
+/// RMS over a motion with many reversals of what a look one sample ahead is off by, from where ever finer steps lead,
+/// as torque on the body and a share of the torque's RMS. A look keeps the bristle where the last one left it.
+static double share_missed_ahead(double peak_speed)
+{
+    enum { looks = 300, fine = 32 };
+    const double sample_s = sim_substeps * substep_s, omega = two_pi * 7.0;
+    const double inertia = model.motor_inertia_kgm2 + model.load_inertia_kgm2, size = peak_speed * inertia * omega;
+    struct sim_stepper quick;
+    double bristle = 0.0, missed = 0.0, all = 0.0;
+    sim_stepper_init_quick(&quick, &model, substep_s);
+    prepare(substep_s / fine);
+    for (size_t n = 0; n < looks; n++) {
+        double angle = omega * sample_s * (double)n;
+        double friction = copysign(0.9 * model.coulomb_friction_Nm, plant.velocity);
+        double torque = size * (cos(angle) + 0.3 * cos(4.3 * angle)) + friction;
+        struct sim_plant ahead = plant;
+        ahead.bristle = bristle;
+        for (size_t i = 0; i < sim_substeps; i++)
+            sim_plant_move(&ahead, &quick, torque);
+        bristle = ahead.bristle;
+        move(torque, (size_t)sim_substeps * fine);
+        double error = inertia * (ahead.velocity - plant.velocity) / sample_s;
+        missed += error * error;
+        all += torque * torque;
+    }
+    return sqrt(missed / all);
+}
+
+static void test_presliding_looks_ahead_as_fine_steps_do(void)
+{
+    static const double distances[] = {1e-5, 1e-4, 1e-3, 1e-2}, exponents[] = {0.33, 1.0, 2.0}, speeds[] = {0.02, 5.0};
+    const double least_sensible = 2e-4; // of the torque: a good torque sensor has ten times as much noise
+    for (size_t d = 0; d < 4; d++)
+        for (size_t e = 0; e < 3; e++)
+            for (size_t s = 0; s < 2; s++) {
+                char message[80];
+                setUp();
+                model.motor_inertia_kgm2 = model.load_inertia_kgm2 = 1e-4;
+                model.coulomb_friction_Nm = 0.05;
+                switch_on("presliding", distances[d], exponents[e], 0.0);
+                snprintf(message, sizeof message, "%g rad, exponent %g, to %g rad/s", distances[d], exponents[e],
+                         speeds[s]);
+                TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(least_sensible, 0.0, share_missed_ahead(speeds[s]), message);
+            }
+}
+
+/// Friction that falls with speed while it builds up.
+static void test_presliding_looks_ahead_beside_stribeck_friction(void)
+{
+    model.motor_inertia_kgm2 = model.load_inertia_kgm2 = 1e-4;
+    model.coulomb_friction_Nm = 0.05;
+    switch_on("presliding", 1e-4, 1.0, 0.0);
+    switch_on("stribeck_friction", 0.02, 1.0, 0.0);
+    TEST_ASSERT_DOUBLE_WITHIN(2e-4, 0.0, share_missed_ahead(5.0));
+}
+
 static void test_presliding_holds_below_its_level(void)
 {
     model.coulomb_friction_Nm = 0.05;
@@ -600,6 +656,8 @@ int main(void)
     RUN_TEST(test_presliding_follows_its_exponent);
     RUN_TEST(test_presliding_is_a_spring_for_small_motion);
     RUN_TEST(test_presliding_follows_its_equation_through_reversals);
+    RUN_TEST(test_presliding_looks_ahead_as_fine_steps_do);
+    RUN_TEST(test_presliding_looks_ahead_beside_stribeck_friction);
     RUN_TEST(test_presliding_holds_below_its_level);
     RUN_TEST(test_second_mode_swings_at_its_frequency_on_a_held_body);
     RUN_TEST(test_second_mode_on_a_free_body_is_a_pair_of_masses);
