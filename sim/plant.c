@@ -502,7 +502,10 @@ static void step_finely(struct state *io, const struct sim_stepper *stepper, dou
 {
     bool bent = stepper->bend.count > 0;
     double dry = 0.0;
-    size_t steps = bent ? sim_stepper_inner_steps(bent_rate(io, stepper), whole_s) : stepper->inner_steps;
+    // `inner_steps` are for a whole step; a look ahead takes no more of them in a part than that asks for.
+    size_t steps = bent             ? sim_stepper_inner_steps(bent_rate(io, stepper), whole_s)
+                   : stepper->quick ? sim_stepper_inner_steps(stepper->chain_rate, whole_s)
+                                    : stepper->inner_steps;
     if (stepper->build_up > 0.0) {
         dry = dry_level(io, stepper, sign_of(io->velocity[0]));
         if (!bent && steps == 1 && slide(io, stepper, torque, dry, whole_s))
