@@ -137,7 +137,8 @@ struct sim_effect {
     /// Dry friction does not switch but builds up: what is missing of its level, over that level, falls per distance
     /// returned by its own power of the exponent. With 1 it comes within 1/e over that distance; below 1 there is an
     /// end to it.
-    double (*build_up)(const double *parameters, double *out_exponent);
+    /// A damper beside the bristles adds out_damping_s times the rate at which that friction changes.
+    double (*build_up)(const double *parameters, double *out_exponent, double *out_damping_s);
     /// Changes the belt at one instant. Called in the order of sim_effects, which is that of the names: backlash takes
     /// its part of the twist before a spring that hardens sees it.
     void (*bend)(const double *parameters, const struct sim_motion *motion, struct sim_belt *io_belt);

@@ -157,11 +157,25 @@ static double built_up(const struct course *course, double position, double dry)
     return level - (level - course->level) * faded / way + missing * left;
 }
 
+/// What the bristles' own damper adds while friction that builds up changes: none where it is built up.
+static double bristle_damping(const struct course *course, const struct state *s, double friction, double dry)
+{
+    const struct sim_stepper *stepper = course->stepper;
+    double missing = course->direction * dry - friction;
+    if (!(stepper->build_up_damping_s > 0.0 && dry > 0.0))
+        return 0.0;
+    double share = fmin(fabs(missing) / dry, 2.0), exponent = stepper->build_up_exponent;
+    double rate = dry * (exponent == 1.0 ? share : pow(share, exponent)) * fabs(s->velocity[0]) / stepper->build_up;
+    return stepper->build_up_damping_s * copysign(rate, missing);
+}
+
 static double motor_acceleration(const struct state *s, const struct course *course, double link)
 {
     const struct sim_stepper *stepper = course->stepper;
     double dry, driving = driving_torque(s, stepper, course->torque, link, course->direction, &dry);
     double friction = stepper->build_up > 0.0 ? built_up(course, s->position[0], dry) : (double)course->direction * dry;
+    if (stepper->build_up > 0.0)
+        friction += bristle_damping(course, s, friction, dry);
     return (driving - friction) / stepper->chain.inertia[0];
 }
 

@@ -21,7 +21,7 @@ static void prepare_effect(struct sim_stepper *self, size_t e)
     else if (effect->oppose)
         hook_up(&self->oppose, e);
     if (effect->build_up)
-        self->build_up = effect->build_up(parameters, &self->build_up_exponent);
+        self->build_up = effect->build_up(parameters, &self->build_up_exponent, &self->build_up_damping_s);
     if (effect->bend && self->model.structure == sim_structure_two_mass)
         hook_up(&self->bend, e);
     if (effect->limit)

@@ -48,6 +48,7 @@ struct sim_stepper {
     size_t inner_steps; ///< that Runge-Kutta needs for it
     double build_up;    ///< distance over which dry friction builds up; 0: it switches
     double build_up_exponent;
+    double build_up_damping_s;  ///< of the bristles: what it adds, over the rate at which the friction changes
     struct sim_opposing steady; ///< the model's friction and the effects that are the same at every instant
     struct sim_hooked oppose;   ///< the others
     struct sim_hooked bend, limit, sense, lose;

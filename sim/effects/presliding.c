@@ -3,6 +3,7 @@
 // distance, Fd the level that Coulomb's and all other dry friction sets (Dahl's model with exponent n). With n = 1 it
 // comes near its level as an exponential does; the smaller n, the more it goes straight there, as springs do that give
 // way all at once.
+// Bristles are damped, too: while the friction changes it is more by a time times its rate (LuGre's sigma1 / sigma0).
 #include "sim/effect.h"
 #include "sim/model.h"
 
@@ -15,8 +16,9 @@ static const double least = 1e-4, linear_least = 1e-6;
 /// Where a search begins, as a share of that: no dry friction switches, and the shorter way shows next to reversals.
 static const double finest = 0.06;
 
-static double presliding_build_up(const double *p, double *out_exponent)
+static double presliding_build_up(const double *p, double *out_exponent, double *out_damping_s)
 {
+    *out_damping_s = p[2];
     *out_exponent = p[1] > 0.0 ? p[1] : 1.0;
     return p[0];
 }
@@ -29,6 +31,7 @@ static bool presliding_scan(const struct sim_model *model, const struct sim_cove
     (void)model;
     out[0] = finest * start * pow(growth, (double)index);
     out[1] = 1.0;
+    out[2] = 1e-4;
     return index == 0 || (index < 11 && out[0] < 0.2 * coverage->position_span);
 }
 
@@ -65,7 +68,7 @@ static bool presliding_applies(const struct sim_model *model)
 const struct sim_effect sim_effect_presliding = {
     .id = "presliding",
     .place = sim_place_friction,
-    .parameter_count = 2,
+    .parameter_count = 3,
     .parameters = {{.name = "presliding_distance_rad",
                     .linear_name = "presliding_distance_m",
                     .kind = sim_parameter_positive,
@@ -83,6 +86,16 @@ const struct sim_effect sim_effect_presliding = {
                     .linear_maximum = 3.0,
                     .optional = true,
                     .usual = 1.0,
+                    .model_offset = SIZE_MAX},
+                   {.name = "presliding_damping_s",
+                    .linear_name = "presliding_damping_s",
+                    .kind = sim_parameter_linear,
+                    .minimum = 0.0,
+                    .maximum = 0.01,
+                    .linear_minimum = 0.0,
+                    .linear_maximum = 0.01,
+                    .optional = true,
+                    .usual = 0.0,
                     .model_offset = SIZE_MAX}},
     .build_up = presliding_build_up,
     .applies = presliding_applies,

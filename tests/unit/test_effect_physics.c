@@ -120,9 +120,9 @@ static void test_presliding_is_a_spring_for_small_motion(void)
     }
 }
 
-/// dv/dt = (T - F) / J, dF/dt = (v Fd(v) - |v| F) / distance by small midpoint steps.
+/// dv/dt = (T - F - damping dF/dt) / J, dF/dt = (v Fd(v) - |v| F) / distance by small midpoint steps.
 static void reference_presliding(double torque, double level, double excess, double excess_speed, double distance,
-                                 double time_s, double io[3])
+                                 double damping_s, double time_s, double io[3])
 {
     const double h = 2e-7;
     size_t steps = (size_t)(time_s / h + 0.5);
@@ -131,7 +131,8 @@ static void reference_presliding(double torque, double level, double excess, dou
         for (int stage = 0; stage < 2; stage++) {
             double reach = stage == 0 ? 0.5 * h : h, ratio = at[1] / excess_speed;
             double dry = level + excess * exp(-ratio * ratio);
-            double rate = (at[1] * dry - fabs(at[1]) * at[2]) / distance, pull = (torque - at[2]) / 0.004, v = at[1];
+            double rate = (at[1] * dry - fabs(at[1]) * at[2]) / distance, v = at[1];
+            double pull = (torque - at[2] - damping_s * rate) / 0.004;
             at[0] = io[0] + reach * v;
             at[1] = io[1] + reach * pull;
             at[2] = io[2] + reach * rate;
@@ -142,18 +143,18 @@ static void reference_presliding(double torque, double level, double excess, dou
 
 static void test_presliding_follows_its_equation_through_reversals(void)
 {
-    static const double distances[] = {1e-4, 1e-3, 2e-2};
-    for (size_t d = 0; d < 3; d++) {
+    static const double distances[] = {1e-4, 1e-3, 2e-2, 1e-3}, dampings_s[] = {0.0, 0.0, 0.0, 5e-4};
+    for (size_t d = 0; d < 4; d++) {
         double state[3] = {0.0, 0.0, 0.0}, largest = 0.0;
         setUp();
         model.coulomb_friction_Nm = 0.05;
-        switch_on("presliding", distances[d], 0.0, 0.0);
+        switch_on("presliding", distances[d], 0.0, dampings_s[d]);
         switch_on("stribeck_friction", 0.02, 0.5, 0.0);
         prepare(substep_s);
         for (size_t n = 0; n < 800; n++) {
             double torque = 0.15 * sin(0.02 * (double)n) + 0.05 * sin(0.13 * (double)n);
             move(torque, 1);
-            reference_presliding(torque, 0.05, 0.02, 0.5, distances[d], substep_s, state);
+            reference_presliding(torque, 0.05, 0.02, 0.5, distances[d], dampings_s[d], substep_s, state);
             largest = fmax(largest, fabs(state[0]));
             // Encoders resolve some 1e-5 rad of travels of tenths.
             TEST_ASSERT_DOUBLE_WITHIN(5e-5 * fmax(largest, 1e-2), state[0], plant.position);

@@ -441,7 +441,7 @@ static void test_hypothesis_claims_what_is_no_detail(void)
     TEST_ASSERT_FALSE(hypothesis_is_detail(&hypothesis, effect));
     for (size_t claims = 0; claims < 2; claims++) {
         struct hypothesis named = hypothesis;
-        hypothesis_name(&named, effect, (double[]){lengths[claims], 1.0});
+        hypothesis_name(&named, effect, (double[]){lengths[claims], 1.0, 1e-4});
         TEST_ASSERT_EQUAL(claims == 0, hypothesis_is_detail(&named, effect));
         TEST_ASSERT_EQUAL(claims, hypothesis_claims(&named));
     }
