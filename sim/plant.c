@@ -632,6 +632,7 @@ static bool slide_at_once(struct state *io, const struct sim_stepper *stepper, d
     take_level(&course, dry);
     if (direction == 0 || !builds_up_slowly(&course, io))
         return false;
+    net -= bristle_damping(&course, io, io->bristle, dry);
     struct state half = *io, next = *io;
     double gained = half_s * net / stepper->chain.inertia[0];
     half.position[0] += half_s * (half.velocity[0] + 0.5 * gained);
@@ -643,6 +644,7 @@ static bool slide_at_once(struct state *io, const struct sim_stepper *stepper, d
     if (!is_exponential(stepper) && fabs(half_dry - dry) > still * dry)
         return false;
     double friction = built_up(&course, half.position[0], half_dry);
+    friction += bristle_damping(&course, &half, friction, half_dry);
     transit(io, stepper, direction, driving + linear * half.velocity[0] - friction, &next);
     if (!(direction * next.velocity[0] > 0.0))
         return false;
