@@ -6,7 +6,7 @@
 #include "lab/diagnose/repeat.h"
 #include "lab/diagnose/search.h"
 #include "lab/numeric/statistics.h"
-#include "sim/belt_drive.h"
+#include "tests/support/recorded_drive.h"
 #include "unity.h"
 
 #include <math.h>
@@ -14,18 +14,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { samples = 512, periods = 10, lead = 3 * samples, rows = lead + samples * periods };
-
-static const double two_pi = 6.283185307179586;
-
 static struct sim_model truth, given;
-static struct recording recording;
-static size_t period_starts[periods];
-static struct evidence evidence;
-static struct fit_data data;
-static struct fit fit;
+static struct recorded_drive drive;
 static struct hypothesis hypothesis;
-static double columns[4][rows], block[4][samples];
 
 void setUp(void)
 {
@@ -44,58 +35,25 @@ void setUp(void)
 
 void tearDown(void)
 {
-    fit_free(&fit);
-    evidence_free(&evidence);
+    recorded_drive_free(&drive);
 }
 
-/// Runs the true drive on a multisine and prepares all up to a fit; the noise is judged under the true model.
+/// A multisine.
+static double command_at(size_t n, double rate_hz, struct sim_command *out)
+{
+    *out = (struct sim_command){.control = sim_control_cascade};
+    for (int line = 1; line <= 40; line += 3) {
+        double w = recorded_two_pi * line * rate_hz / recorded_samples, angle = w * (double)n / rate_hz;
+        out->position += 3.0 / w * sin(angle + line * line);
+        out->velocity += 3.0 * cos(angle + line * line);
+    }
+    return 0.0;
+}
+
 static void record(uint64_t seed)
 {
-    static struct sim_belt_drive drive;
     truth.seed = seed;
-    sim_belt_drive_init(&drive, &truth, 0.0);
-    for (size_t n = 0; n < rows; n++) {
-        struct sim_command command = {.control = sim_control_cascade};
-        for (int line = 1; line <= 40; line += 3) {
-            double w = two_pi * line * truth.sample_rate_hz / samples, angle = w * (double)n / truth.sample_rate_hz;
-            command.position += 3.0 / w * sin(angle + line * line);
-            command.velocity += 3.0 * cos(angle + line * line);
-        }
-        struct sim_sample sample;
-        sim_belt_drive_step(&drive, &command, &sample);
-        columns[0][n] = sample.torque_ref;
-        columns[1][n] = sample.torque;
-        columns[2][n] = sample.position;
-        columns[3][n] = sample.velocity;
-    }
-    memset(block, 0, sizeof block);
-    for (size_t c = 0; c < 4; c++)
-        for (size_t n = lead; n < rows; n++)
-            block[c][(n - lead) % samples] += columns[c][n] / periods;
-    recording = (struct recording){.periodic = true,
-                                   .rate_hz = truth.sample_rate_hz,
-                                   .periods = periods,
-                                   .lead = lead,
-                                   .starts = period_starts,
-                                   .band = 60};
-    for (size_t p = 0; p < periods; p++)
-        period_starts[p] = lead + p * samples;
-    recording.block = (struct stretch){.samples = samples,
-                                       .torque_ref = block[0],
-                                       .torque = block[1],
-                                       .position = block[2],
-                                       .velocity = block[3],
-                                       .substeps = sim_substeps};
-    recording.all = (struct stretch){.samples = rows,
-                                     .torque_ref = columns[0],
-                                     .torque = columns[1],
-                                     .position = columns[2],
-                                     .velocity = columns[3],
-                                     .substeps = sim_substeps};
-    TEST_ASSERT_TRUE(evidence_init(&evidence, &recording, 0.005));
-    TEST_ASSERT_TRUE(evidence_estimate_noise(&evidence, &truth));
-    data = (struct fit_data){.runs = 1, .evidence = &evidence, .values = evidence.values};
-    TEST_ASSERT_TRUE(fit_init(&fit, &data));
+    TEST_ASSERT_TRUE(recorded_drive_init(&drive, &truth, 0.0, command_at, 3 * recorded_samples, 10));
 }
 
 static int name(const char *id, double value)
@@ -111,16 +69,16 @@ static void test_fit_finds_a_friction_that_the_given_model_has_wrong(void)
     record(1);
     given.viscous_friction_Nms_per_rad = 0.002;
     hypothesis_init(&hypothesis, &given, false, true);
-    double before = fit_cost(&fit, &data, &hypothesis, hypothesis.x);
+    double before = fit_cost(&drive.fit, &drive.data, &hypothesis, hypothesis.x);
     int effect = name("viscous_friction", 0.002);
-    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 10));
+    TEST_ASSERT_TRUE(fit_run(&drive.fit, &drive.data, &hypothesis, 10));
     double value, deviation;
-    hypothesis_parameters(&hypothesis, effect, fit.covariance, &value, &deviation);
+    hypothesis_parameters(&hypothesis, effect, drive.fit.covariance, &value, &deviation);
     TEST_ASSERT_TRUE(deviation > 0.0 && deviation < 1e-4);
     TEST_ASSERT_DOUBLE_WITHIN(5.0 * deviation, 0.004, value);
-    TEST_ASSERT_TRUE(fit.cost < before - 100.0);
+    TEST_ASSERT_TRUE(drive.fit.cost < before - 100.0);
     // A right model leaves noise: one a value, with the scatter of the noise estimated from so few periods.
-    TEST_ASSERT_DOUBLE_WITHIN(0.4, 1.0, fit.cost / (double)data.values);
+    TEST_ASSERT_DOUBLE_WITHIN(0.4, 1.0, drive.fit.cost / (double)drive.data.values);
 }
 
 static void test_fit_cost_is_the_sum_of_squares_and_priors(void)
@@ -128,21 +86,21 @@ static void test_fit_cost_is_the_sum_of_squares_and_priors(void)
     record(2);
     hypothesis_init(&hypothesis, &given, false, true);
     hypothesis.x[0] = 0.003;
-    double cost = fit_cost(&fit, &data, &hypothesis, hypothesis.x), sum = 0.0, prior = 0.0;
+    double cost = fit_cost(&drive.fit, &drive.data, &hypothesis, hypothesis.x), sum = 0.0, prior = 0.0;
     struct sim_model model;
-    double *residual = malloc(data.values * sizeof *residual);
+    double *residual = malloc(drive.data.values * sizeof *residual);
     TEST_ASSERT_NOT_NULL(residual);
     hypothesis_model(&hypothesis, NULL, &model);
-    fit_residual(&data, &model, residual);
-    for (size_t i = 0; i < data.values; i++) {
+    fit_residual(&drive.data, &model, residual);
+    for (size_t i = 0; i < drive.data.values; i++) {
         sum += residual[i] * residual[i];
-        TEST_ASSERT_EQUAL_DOUBLE(residual[i], fit.residual[i]);
+        TEST_ASSERT_EQUAL_DOUBLE(residual[i], drive.fit.residual[i]);
     }
     free(residual);
     for (size_t i = 0; i < hypothesis.count; i++)
         prior += pow(hypothesis.coordinates[i].weight * (hypothesis.x[i] - hypothesis.coordinates[i].centre), 2);
     TEST_ASSERT_TRUE(prior > 0.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * prior, prior, fit.prior);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * prior, prior, drive.fit.prior);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12 * cost, sum + prior, cost);
 }
 
@@ -151,7 +109,7 @@ static void test_fit_stays_within_its_boxes_and_gives_no_deviation_at_a_wall(voi
     record(3);
     given.coulomb_friction_Nm = 0.02; // the truth is half as large again: the box of an unnamed number ends far before
     hypothesis_init(&hypothesis, &given, false, true);
-    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 10));
+    TEST_ASSERT_TRUE(fit_run(&drive.fit, &drive.data, &hypothesis, 10));
     bool found = false;
     for (size_t i = 0; i < hypothesis.count; i++) {
         const struct coordinate *c = &hypothesis.coordinates[i];
@@ -159,7 +117,7 @@ static void test_fit_stays_within_its_boxes_and_gives_no_deviation_at_a_wall(voi
         if (c->model_offset == offsetof(struct sim_model, coulomb_friction_Nm)) {
             found = true;
             TEST_ASSERT_EQUAL_DOUBLE(c->upper, hypothesis.x[i]);
-            TEST_ASSERT_EQUAL_DOUBLE(0.0, fit.covariance[i * hypothesis.count + i]);
+            TEST_ASSERT_EQUAL_DOUBLE(0.0, drive.fit.covariance[i * hypothesis.count + i]);
         }
     }
     TEST_ASSERT_TRUE(found);
@@ -172,12 +130,13 @@ static void test_fit_never_makes_it_worse(void)
     for (size_t i = 0; i < sizeof starts / sizeof starts[0]; i++) {
         hypothesis_init(&hypothesis, &given, false, true);
         name("coulomb_friction", starts[i]);
-        double before = fit_cost(&fit, &data, &hypothesis, hypothesis.x);
+        double before = fit_cost(&drive.fit, &drive.data, &hypothesis, hypothesis.x);
         for (size_t iterations = 1; iterations <= 4; iterations++) {
-            TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, iterations));
-            TEST_ASSERT_TRUE(fit.cost <= before);
-            before = fit.cost;
-            TEST_ASSERT_DOUBLE_WITHIN(1e-9 * before, before, fit_cost(&fit, &data, &hypothesis, hypothesis.x));
+            TEST_ASSERT_TRUE(fit_run(&drive.fit, &drive.data, &hypothesis, iterations));
+            TEST_ASSERT_TRUE(drive.fit.cost <= before);
+            before = drive.fit.cost;
+            TEST_ASSERT_DOUBLE_WITHIN(1e-9 * before, before,
+                                      fit_cost(&drive.fit, &drive.data, &hypothesis, hypothesis.x));
         }
     }
 }
@@ -187,17 +146,17 @@ static void test_fit_step_with_borrowed_derivatives_is_the_first_step_of_a_fit(v
     record(5);
     given.viscous_friction_Nms_per_rad = 0.0;
     hypothesis_init(&hypothesis, &given, false, true);
-    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 6));
+    TEST_ASSERT_TRUE(fit_run(&drive.fit, &drive.data, &hypothesis, 6));
     struct hypothesis stepped = hypothesis, whole;
     double value = 0.003;
     hypothesis_name(&stepped, sim_effect_find("viscous_friction"), &value);
     whole = stepped;
     struct fit step = {0};
-    TEST_ASSERT_TRUE(fit_init(&step, &data));
-    double start = fit_cost(&step, &data, &stepped, stepped.x);
-    TEST_ASSERT_TRUE(fit_step(&step, &data, &hypothesis, &fit, &stepped));
+    TEST_ASSERT_TRUE(fit_init(&step, &drive.data));
+    double start = fit_cost(&step, &drive.data, &stepped, stepped.x);
+    TEST_ASSERT_TRUE(fit_step(&step, &drive.data, &hypothesis, &drive.fit, &stepped));
     double cost = step.cost;
-    TEST_ASSERT_TRUE(fit_run(&step, &data, &whole, 6));
+    TEST_ASSERT_TRUE(fit_run(&step, &drive.data, &whole, 6));
     double best = step.cost;
     fit_free(&step);
     // The model is nearly linear in friction: one step gets nearly all of the way.
@@ -231,9 +190,9 @@ static void assert_deviations(const char *id, double start, double expected)
         draw_given(&random);
         hypothesis_init(&hypothesis, &given, false, true);
         int effect = name(id, start);
-        TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 8));
+        TEST_ASSERT_TRUE(fit_run(&drive.fit, &drive.data, &hypothesis, 8));
         double value, deviation;
-        hypothesis_parameters(&hypothesis, effect, fit.covariance, &value, &deviation);
+        hypothesis_parameters(&hypothesis, effect, drive.fit.covariance, &value, &deviation);
         sum += pow((value - expected) / deviation, 2);
         tearDown();
     }
@@ -270,11 +229,11 @@ static void test_fit_of_a_rough_residual_has_one_end_and_one_deviation(void)
         double value, deviation;
         hypothesis_init(&hypothesis, &given, false, true);
         name("backlash", starts[i] * right);
-        TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 8));
-        hypothesis_parameters(&hypothesis, gap, fit.covariance, &value, &deviation);
-        first_cost = i == 0 ? fit.cost : first_cost;
+        TEST_ASSERT_TRUE(fit_run(&drive.fit, &drive.data, &hypothesis, 8));
+        hypothesis_parameters(&hypothesis, gap, drive.fit.covariance, &value, &deviation);
+        first_cost = i == 0 ? drive.fit.cost : first_cost;
         first_deviation = i == 0 ? deviation : first_deviation;
-        TEST_ASSERT_DOUBLE_WITHIN(jump, first_cost, fit.cost);
+        TEST_ASSERT_DOUBLE_WITHIN(jump, first_cost, drive.fit.cost);
         TEST_ASSERT_DOUBLE_WITHIN(most_off * deviation, right, value);
         TEST_ASSERT_DOUBLE_WITHIN(alike * first_deviation, first_deviation, deviation);
     }
@@ -292,17 +251,17 @@ static void test_repeat_adds_by_how_much_other_data_give_another_number(void)
     given.viscous_friction_Nms_per_rad = 0.002;
     hypothesis_init(&hypothesis, &given, false, true);
     int effect = name("viscous_friction", 0.002);
-    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 10));
+    TEST_ASSERT_TRUE(fit_run(&drive.fit, &drive.data, &hypothesis, 10));
     struct repeat repeat;
-    TEST_ASSERT_TRUE(repeat_compare(&data, &hypothesis, &fit, &data, &evidence, &repeat));
+    TEST_ASSERT_TRUE(repeat_compare(&drive.data, &hypothesis, &drive.fit, &drive.data, &drive.evidence, &repeat));
     TEST_ASSERT_EQUAL_DOUBLE(0.0, repeat.variance[effect][0]); // the same data
     // A value that is fifty deviations from what the other data say, both deviations alike.
     double value, deviation;
-    hypothesis_parameters(&hypothesis, effect, fit.covariance, &value, &deviation);
+    hypothesis_parameters(&hypothesis, effect, drive.fit.covariance, &value, &deviation);
     for (size_t i = 0; i < hypothesis.count; i++)
         if (hypothesis.coordinates[i].effect == effect) // on a linear scale
             hypothesis.x[i] = (value + 50.0 * deviation) / hypothesis.coordinates[i].unit;
-    TEST_ASSERT_TRUE(repeat_compare(&data, &hypothesis, &fit, &data, &evidence, &repeat));
+    TEST_ASSERT_TRUE(repeat_compare(&drive.data, &hypothesis, &drive.fit, &drive.data, &drive.evidence, &repeat));
     TEST_ASSERT_DOUBLE_WITHIN(0.05 * 50.0 * deviation, 50.0 * deviation, sqrt(repeat.variance[effect][0]));
 }
 
@@ -322,11 +281,11 @@ static void test_fit_of_a_hidden_mass_ends_at_the_truth_when_the_noise_follows(v
     double values[sim_effect_parameters_max] = {500.0, 0.05}, deviations[sim_effect_parameters_max] = {0.0};
     TEST_ASSERT_TRUE(effect >= 0);
     hypothesis_init(&hypothesis, &given, false, true);
-    TEST_ASSERT_FALSE(hidden_mass_concerns(&data, &hypothesis));
+    TEST_ASSERT_FALSE(hidden_mass_concerns(&drive.data, &hypothesis));
     hypothesis_name(&hypothesis, effect, values);
-    TEST_ASSERT_TRUE(hidden_mass_concerns(&data, &hypothesis));
-    TEST_ASSERT_TRUE(hidden_mass_fit(&data, &evidence, &fit, &hypothesis));
-    hypothesis_parameters(&hypothesis, effect, fit.covariance, values, deviations);
+    TEST_ASSERT_TRUE(hidden_mass_concerns(&drive.data, &hypothesis));
+    TEST_ASSERT_TRUE(hidden_mass_fit(&drive.data, &drive.evidence, &drive.fit, &hypothesis));
+    hypothesis_parameters(&hypothesis, effect, drive.fit.covariance, values, deviations);
     TEST_ASSERT_DOUBLE_WITHIN(most_share * 400.0, 400.0, values[0]);
     TEST_ASSERT_DOUBLE_WITHIN(5.0 * deviations[0], 400.0, values[0]);
     // What is held stays, and is free again afterwards.
@@ -334,7 +293,7 @@ static void test_fit_of_a_hidden_mass_ends_at_the_truth_when_the_noise_follows(v
     double x = hypothesis.x[0];
     hidden_mass_hold(&hypothesis, &free_again);
     TEST_ASSERT_TRUE(hidden_mass_holds(&hypothesis, effect));
-    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 3));
+    TEST_ASSERT_TRUE(fit_run(&drive.fit, &drive.data, &hypothesis, 3));
     hidden_mass_release(&free_again, &hypothesis);
     TEST_ASSERT_FALSE(hidden_mass_holds(&hypothesis, effect));
     TEST_ASSERT_EQUAL_DOUBLE(x, hypothesis.x[0]);
@@ -342,10 +301,10 @@ static void test_fit_of_a_hidden_mass_ends_at_the_truth_when_the_noise_follows(v
 
 static void test_hidden_mass_cost_below_what_noise_leaves_is_not_believed(void)
 {
-    data.values = 800; // chance: 800 +- 40
-    TEST_ASSERT_EQUAL_DOUBLE(801.0, hidden_mass_credible_cost(&data, 801.0));
-    TEST_ASSERT_EQUAL_DOUBLE(740.0, hidden_mass_credible_cost(&data, 740.0));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 800.0 - 1.645 * 40.0, hidden_mass_credible_cost(&data, 600.0));
+    drive.data.values = 800; // chance: 800 +- 40
+    TEST_ASSERT_EQUAL_DOUBLE(801.0, hidden_mass_credible_cost(&drive.data, 801.0));
+    TEST_ASSERT_EQUAL_DOUBLE(740.0, hidden_mass_credible_cost(&drive.data, 740.0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 800.0 - 1.645 * 40.0, hidden_mass_credible_cost(&drive.data, 600.0));
 }
 
 /* A fit in which the noise followed says what is left without a name; under other noise that is worth nothing. */
@@ -354,22 +313,22 @@ static void test_search_evidence_is_by_what_was_remembered_until_the_noise_is_an
     static struct search_memo memo;
     memset(&memo, 0, sizeof memo);
     record(9);
-    data.memo = &memo;
+    drive.data.memo = &memo;
     given.viscous_friction_Nms_per_rad = 0.0;
     hypothesis_init(&hypothesis, &given, false, true);
     const struct hypothesis without = hypothesis;
     int effect = name("viscous_friction", 0.004);
-    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 8));
-    double fitted = search_evidence(&data, &hypothesis, &fit, effect);
+    TEST_ASSERT_TRUE(fit_run(&drive.fit, &drive.data, &hypothesis, 8));
+    double fitted = search_evidence(&drive.data, &hypothesis, &drive.fit, effect);
     TEST_ASSERT_TRUE(fitted > 20.0);
-    search_remember(&data, &without, fit.cost + 200.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 100.0, search_evidence(&data, &hypothesis, &fit, effect));
-    search_remember(&data, &without, fit.cost + 300.0); // the last word counts, also where it is more
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 150.0, search_evidence(&data, &hypothesis, &fit, effect));
+    search_remember(&drive.data, &without, drive.fit.cost + 200.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 100.0, search_evidence(&drive.data, &hypothesis, &drive.fit, effect));
+    search_remember(&drive.data, &without, drive.fit.cost + 300.0); // the last word counts, also where it is more
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 150.0, search_evidence(&drive.data, &hypothesis, &drive.fit, effect));
     truth.motor_inertia_kgm2 *= 1.01;
-    TEST_ASSERT_TRUE(evidence_estimate_noise(&evidence, &truth));
-    TEST_ASSERT_TRUE(fit_run(&fit, &data, &hypothesis, 8));
-    TEST_ASSERT_DOUBLE_WITHIN(0.1 * fitted, fitted, search_evidence(&data, &hypothesis, &fit, effect));
+    TEST_ASSERT_TRUE(evidence_estimate_noise(&drive.evidence, &truth));
+    TEST_ASSERT_TRUE(fit_run(&drive.fit, &drive.data, &hypothesis, 8));
+    TEST_ASSERT_DOUBLE_WITHIN(0.1 * fitted, fitted, search_evidence(&drive.data, &hypothesis, &drive.fit, effect));
 }
 
 int main(void)
