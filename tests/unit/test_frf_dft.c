@@ -4,6 +4,7 @@
 #include "frf/dft.h"
 #include "frf/statistics.h"
 
+#include "tests/support/exact_sum.h"
 #include "unity.h"
 
 #include <math.h>
@@ -39,8 +40,7 @@ static uint64_t random_state;
 
 static uint32_t random_u32(void)
 {
-    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
-    return (uint32_t)(random_state >> 32);
+    return exact_random_u32(&random_state);
 }
 
 void setUp(void)
@@ -84,53 +84,21 @@ static void expect_canaries(uint32_t channels)
         TEST_ASSERT_EQUAL_HEX8(canary, behind[i]);
 }
 
-/* Bins spread over 1 .. below N/2, both ends included. */
-static void spread_bins(uint32_t period, uint32_t count)
+static void spread_bins(uint32_t period, uint32_t most)
 {
-    uint32_t last = (period - 1u) / 2u;
-    bin_count = 0;
-    for (uint32_t i = 0; i < count && i < last; i++) {
-        uint32_t bin = count >= last ? i + 1u : 1u + (uint32_t)((uint64_t)i * (last - 1u) / (count - 1u));
-        if (bin_count == 0 || bin > bins[bin_count - 1u])
-            bins[bin_count++] = bin;
-    }
-}
-
-/* high 2^32 + low, 0 <= low < 2^32: 95 bits, far beyond any sum here, on any machine. */
-struct big {
-    int64_t high, low;
-};
-
-static void big_add(struct big *self, int64_t value)
-{
-    const int64_t base = INT64_C(1) << 32;
-    int64_t low = ((value % base) + base) % base;
-    self->low += low;
-    self->high += (value - low) / base;
-    self->high += self->low / base;
-    self->low %= base;
+    bin_count = exact_spread_bins(period, most, bins);
 }
 
 /* sum of x[n] w[(k n + offset) mod N] for the table's sine (offset 0) or cosine */
 static void big_sum(const int16_t *frames, uint32_t channels, uint32_t period, uint32_t bin, const int32_t *w31,
-                    const int16_t *w15, int sign, struct big *out_sum)
+                    const int16_t *w15, int sign, struct exact_sum *out_sum)
 {
-    *out_sum = (struct big){0, 0};
+    *out_sum = (struct exact_sum){0, 0};
     for (uint32_t n = 0; n < period; n++) {
         size_t index = (size_t)((uint64_t)bin * n % period);
         int64_t w = w31 ? w31[index] : w15[index];
-        big_add(out_sum, sign * (int64_t)frames[(size_t)n * channels] * w);
+        exact_sum_add(out_sum, sign * (int64_t)frames[(size_t)n * channels] * w);
     }
-}
-
-static void expect_big(const struct big *expected, int64_t actual, uint32_t period, uint32_t bin)
-{
-    char message[64];
-    struct big sum = {0, 0};
-    big_add(&sum, actual);
-    snprintf(message, sizeof message, "N = %u, bin %u", (unsigned)period, (unsigned)bin);
-    TEST_ASSERT_EQUAL_INT64_MESSAGE(expected->high, sum.high, message);
-    TEST_ASSERT_EQUAL_INT64_MESSAGE(expected->low, sum.low, message);
 }
 
 static void expect_bit_exact(struct frf_dft *dft, uint32_t channels)
@@ -140,13 +108,13 @@ static void expect_bit_exact(struct frf_dft *dft, uint32_t channels)
     bool is_q15 = dft->number == frf_number_q15;
     for (uint32_t b = 0; b < bin_count; b++) {
         for (uint32_t c = 0; c < channels; c++) {
-            struct big sum;
+            struct exact_sum sum;
             big_sum(samples + c, channels, dft->period_samples, bins[b], is_q15 ? NULL : twiddles_q31.cosine,
                     twiddles_q15.cosine, 1, &sum);
-            expect_big(&sum, frf_period_real(dft, &period, b, c), dft->period_samples, bins[b]);
+            exact_sum_expect(&sum, frf_period_real(dft, &period, b, c), dft->period_samples, bins[b]);
             big_sum(samples + c, channels, dft->period_samples, bins[b], is_q15 ? NULL : twiddles_q31.sine,
                     twiddles_q15.sine, -1, &sum);
-            expect_big(&sum, frf_period_imaginary(dft, &period, b, c), dft->period_samples, bins[b]);
+            exact_sum_expect(&sum, frf_period_imaginary(dft, &period, b, c), dft->period_samples, bins[b]);
         }
     }
 }

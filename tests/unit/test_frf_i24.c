@@ -4,6 +4,7 @@
 #include "frf/dft.h"
 #include "frf/statistics.h"
 
+#include "tests/support/exact_sum.h"
 #include "unity.h"
 
 #include <math.h>
@@ -31,8 +32,7 @@ void tearDown(void) {}
 
 static uint32_t random_u32(void)
 {
-    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
-    return (uint32_t)(random_state >> 32);
+    return exact_random_u32(&random_state);
 }
 
 static void fill_random(uint32_t count)
@@ -43,13 +43,7 @@ static void fill_random(uint32_t count)
 
 static void spread_bins(uint32_t period, uint32_t most)
 {
-    uint32_t last = (period - 1u) / 2u;
-    bin_count = 0;
-    for (uint32_t i = 0; i < most && i < last; i++) {
-        uint32_t bin = most >= last ? i + 1u : 1u + (uint32_t)((uint64_t)i * (last - 1u) / (most - 1u));
-        if (bin_count == 0 || bin > bins[bin_count - 1u])
-            bins[bin_count++] = bin;
-    }
+    bin_count = exact_spread_bins(period, most, bins);
 }
 
 static void build(uint32_t period)
@@ -70,31 +64,13 @@ static void start(struct frf_dft *dft, uint32_t channels)
     TEST_ASSERT_EQUAL_INT(core_ok, frf_dft_init_q23(dft, &config, &twiddles));
 }
 
-/* high 2^32 + low, 0 <= low < 2^32 */
-struct wide {
-    int64_t high, low;
-};
-
-static void wide_add(struct wide *self, int64_t value)
-{
-    const int64_t base = INT64_C(1) << 32;
-    int64_t low = (value % base + base) % base;
-    self->low += low;
-    self->high += (value - low) / base + self->low / base;
-    self->low %= base;
-}
-
 static void expect_sum(const int32_t *frames, uint32_t channels, const int32_t *wave, uint32_t period, uint32_t bin,
                        int sign, int64_t actual)
 {
-    struct wide expected = {0, 0}, found = {0, 0};
-    char message[64];
+    struct exact_sum expected = {0, 0};
     for (uint32_t n = 0; n < period; n++)
-        wide_add(&expected, sign * (int64_t)frames[n * channels] * wave[(uint64_t)bin * n % period]);
-    wide_add(&found, actual);
-    snprintf(message, sizeof message, "N = %u, bin %u", (unsigned)period, (unsigned)bin);
-    TEST_ASSERT_EQUAL_INT64_MESSAGE(expected.high, found.high, message);
-    TEST_ASSERT_EQUAL_INT64_MESSAGE(expected.low, found.low, message);
+        exact_sum_add(&expected, sign * (int64_t)frames[n * channels] * wave[(uint64_t)bin * n % period]);
+    exact_sum_expect(&expected, actual, period, bin);
     sums++;
 }
 

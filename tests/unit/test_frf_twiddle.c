@@ -3,6 +3,7 @@
  * are exact sums over the factors that their definition gives, which are within their bounds of the sine. */
 #include "frf/dft.h"
 
+#include "tests/support/exact_sum.h"
 #include "unity.h"
 
 #include <math.h>
@@ -63,8 +64,7 @@ void tearDown(void) {}
 
 static uint32_t random_u32(void)
 {
-    random_state = random_state * 6364136223846793005u + 1442695040888963407u;
-    return (uint32_t)(random_state >> 32);
+    return exact_random_u32(&random_state);
 }
 
 static void build(uint32_t period)
@@ -374,30 +374,6 @@ static void test_two_level_factors_on_the_axes_are_not_beyond_one(void)
     printf("two-level Q31: %lu factors on an axis, N = 4 .. 65536\n", axes);
 }
 
-/* high 2^32 + low, 0 <= low < 2^32 */
-struct wide {
-    int64_t high, low;
-};
-
-static void wide_add(struct wide *self, int64_t value)
-{
-    const int64_t base = INT64_C(1) << 32;
-    int64_t low = (value % base + base) % base;
-    self->low += low;
-    self->high += (value - low) / base + self->low / base;
-    self->low %= base;
-}
-
-static void expect_wide(const struct wide *expected, int64_t actual, uint32_t period, uint32_t bin)
-{
-    struct wide found = {0, 0};
-    char message[64];
-    snprintf(message, sizeof message, "N = %u, bin %u", (unsigned)period, (unsigned)bin);
-    wide_add(&found, actual);
-    TEST_ASSERT_EQUAL_INT64_MESSAGE(expected->high, found.high, message);
-    TEST_ASSERT_EQUAL_INT64_MESSAGE(expected->low, found.low, message);
-}
-
 /* Full scale against the sign of a bin's cosine or sine: its sum is the largest there is. */
 static void fill_worst(uint32_t period, uint32_t bin, bool is_sine)
 {
@@ -420,15 +396,15 @@ static unsigned long expect_exact(enum frf_number number, uint32_t period)
     add(&dft, 0, period);
     TEST_ASSERT_TRUE(frf_dft_latest(&dft, &latched));
     for (uint32_t b = 0; b < bin_count; b++) {
-        struct wide real = {0, 0}, imaginary = {0, 0};
+        struct exact_sum real = {0, 0}, imaginary = {0, 0};
         for (uint32_t n = 0; n < period; n++) {
             uint32_t index = (uint32_t)((uint64_t)bins[b] * n % period);
             int64_t sample = number == frf_number_q23 ? samples_i24[n] : samples_i16[n];
-            wide_add(&real, sample * factors[index].cosine);
-            wide_add(&imaginary, -(sample * factors[index].sine));
+            exact_sum_add(&real, sample * factors[index].cosine);
+            exact_sum_add(&imaginary, -(sample * factors[index].sine));
         }
-        expect_wide(&real, frf_period_real(&dft, &latched, b, 0), period, bins[b]);
-        expect_wide(&imaginary, frf_period_imaginary(&dft, &latched, b, 0), period, bins[b]);
+        exact_sum_expect(&real, frf_period_real(&dft, &latched, b, 0), period, bins[b]);
+        exact_sum_expect(&imaginary, frf_period_imaginary(&dft, &latched, b, 0), period, bins[b]);
     }
     return 2ul * bin_count;
 }
