@@ -268,7 +268,8 @@ static int find_stand_in(enum truth_kind kind, enum truth_refit *out)
     return kind == truth_kind_torque_lag || kind == truth_kind_dead_time;
 }
 
-static int find_evidence(struct truth_case *self, struct truth_evidence *scratch, int keep_basis)
+// Of each effect. refit: as long as a better refit is found, for the answer; else one projection, for the search.
+static int find_evidence(struct truth_case *self, struct truth_evidence *scratch, int keep_basis, int refit)
 {
     unsigned fixed = 0u;
     int aperiodic = 0, status = 0;
@@ -291,7 +292,8 @@ static int find_evidence(struct truth_case *self, struct truth_evidence *scratch
         put_off(&given, self->errors);
         truth_kind_refit(self->wish.kind[i], &self->truth.plant, &given, &other.plant);
         setting.reach = find_stand_in(self->wish.kind[i], &setting.stand_in) ? TRUTH_REFIT_SHARE : 0.0;
-        status = truth_evidence_find(&self->truth, &other, &setting, &scratch[i]);
+        status = refit ? truth_evidence_refit(&self->truth, &given, &other, &setting, &scratch[i])
+                       : truth_evidence_find(&self->truth, &other, &setting, &scratch[i]);
         self->evidence_nats[i] = scratch[i].nats;
         self->share[i] = scratch[i].share;
         if (self->wish.kind[i] == truth_kind_lost_samples) {
@@ -397,6 +399,9 @@ static int sizes_fit(const struct truth_case *self, double target)
 static int reach_by_noise(struct truth_case *self, struct truth_evidence *scratch, double target)
 {
     const double most = 6.0;
+    if (find_evidence(self, scratch, 0, 1)) {
+        return 0;
+    }
     double ratio = mean_log_ratio(self, target), factor = exp(0.5 * ratio);
     if (!(factor <= most && factor >= 1.0 / most)) {
         return 0;
@@ -405,7 +410,7 @@ static int reach_by_noise(struct truth_case *self, struct truth_evidence *scratc
         scale_noise(self, factor);
     }
     compose(self);
-    return !find_evidence(self, scratch, 1) && sizes_fit(self, target);
+    return !find_evidence(self, scratch, 0, 1) && sizes_fit(self, target);
 }
 
 // One more try at the amounts: 1 when they are right or cannot change any more, 0 when not, -1 when the drive fails.
@@ -415,7 +420,7 @@ static int step_amounts(struct truth_case *self, struct truth_evidence *scratch,
     const double first_noise = 6.0;
     int settled = 1;
     compose(self);
-    if (find_evidence(self, scratch, step > 0)) {
+    if (find_evidence(self, scratch, step > 0, 0)) {
         return -1;
     }
     if (step == 0) {

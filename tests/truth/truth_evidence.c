@@ -155,18 +155,18 @@ static void follow_period(struct follower *self, const struct truth_run *run, st
 }
 
 // Takes out of `io` what lies along the first `count` directions and gives it length one; returns the length it had
-// then, 0 when nothing was left.
-static double make_direction(double basis[][VALUES], int count, double *io)
+// then, 0 when nothing was left. parts: what it had of each direction, itself included.
+static double make_direction(double basis[][VALUES], int count, double *io, double *parts)
 {
     const double nothing = 1e-6;
     double before = sqrt(dot(io, io));
     for (int k = 0; k < count; k++) {
-        double along = dot(basis[k], io);
+        parts[k] = dot(basis[k], io);
         for (int i = 0; i < VALUES; i++) {
-            io[i] -= along * basis[k][i];
+            io[i] -= parts[k] * basis[k][i];
         }
     }
-    double length = sqrt(dot(io, io));
+    double length = parts[count] = sqrt(dot(io, io));
     for (int i = 0; i < VALUES && length > 0.0; i++) {
         io[i] /= length;
     }
@@ -203,13 +203,34 @@ static int change_by(const struct truth_plant_spec *other, enum truth_refit whic
     return 1;
 }
 
+static void add_direction(int which, const double *parts, int count, struct truth_evidence *out)
+{
+    for (int k = 0; k <= count; k++) {
+        out->made_of[k][which] = parts[k];
+    }
+    out->which[count] = which;
+}
+
+// The relative changes of the numbers that take `along` out of the residual.
+static void find_moves(const double *along, struct truth_evidence *io)
+{
+    memset(io->move, 0, sizeof io->move);
+    for (int k = io->refits; k-- > 0;) {
+        double rest = -along[k];
+        for (int later = k + 1; later < io->refits; later++) {
+            rest -= io->made_of[k][io->which[later]] * io->move[io->which[later]];
+        }
+        io->move[io->which[k]] = rest / io->made_of[k][io->which[k]];
+    }
+}
+
 // Orthonormal basis of what the refit can do, on the second period. The direction of what stands in for the effect is
 // taken anew each time: it makes nearly the same residual, and what is left of that goes by the angle between the two.
 static void find_basis(const struct truth_plant_spec *other, const struct truth_run *run,
                        const struct truth_evidence_setting *setting, const struct noise *noise, struct off *off,
                        struct truth_evidence *out)
 {
-    double base[VALUES];
+    double base[VALUES], parts[truth_refit_count + 1];
     int count = 0, keep = setting->keep_basis, stands_in = setting->reach > 0.0;
     if (!keep || stands_in) {
         follow_second(other, run, setting->seed, noise, off, base);
@@ -217,22 +238,26 @@ static void find_basis(const struct truth_plant_spec *other, const struct truth_
     for (int which = 0; !keep && which < truth_refit_count; which++) {
         if (!(setting->not_free >> which & 1u) &&
             change_by(other, (enum truth_refit)which, run, setting->seed, noise, off, base, out->refit[count])) {
-            count += make_direction(out->refit, count, out->refit[count]) > 0.0;
+            if (make_direction(out->refit, count, out->refit[count], parts) > 0.0) {
+                add_direction(which, parts, count++, out);
+            }
         }
     }
     out->refits = keep ? out->refits : count;
     out->stand_in_size = 0.0;
     if (stands_in && change_by(other, setting->stand_in, run, setting->seed, noise, off, base, out->stand_in)) {
-        out->stand_in_size = make_direction(out->refit, out->refits, out->stand_in);
+        out->stand_in_size = make_direction(out->refit, out->refits, out->stand_in, parts);
     }
 }
 
 // Take from the residual what the refit can explain of it.
 static void take_refit(const struct truth_evidence_setting *setting, int looked_at, struct truth_evidence *io)
 {
+    double all[truth_refit_count + 1];
     for (int k = 0; k <= io->refits; k++) {
         const double *direction = k < io->refits ? io->refit[k] : io->stand_in;
         double along = k < io->refits || io->stand_in_size > 0.0 ? dot(direction, io->residual) : 0.0, taken = along;
+        all[k] = along;
         if (k == io->refits) {
             double most = setting->reach * io->stand_in_size;
             taken = fmax(-most, fmin(most, along));
@@ -242,6 +267,7 @@ static void take_refit(const struct truth_evidence_setting *setting, int looked_
             io->residual[i] -= taken * direction[i];
         }
     }
+    find_moves(all, io);
 }
 
 static double torque_share(const struct off *off, const struct truth_run *run, int first)
@@ -303,6 +329,47 @@ int truth_evidence_find(const struct truth_drive *truth, const struct truth_driv
     truth_run_free(&run);
     free(noise);
     free(off);
+    return status;
+}
+
+// Takes part of the moves, each number within what `believed` may be off by.
+static void move_refit(const struct truth_plant_spec *from, const double *move, double part,
+                       const struct truth_plant_spec *believed, struct truth_plant_spec *out)
+{
+    const double most[truth_refit_count] = {0.02, 0.05, 0.10, 0.10, 0.10, 0.10, 0.08, 0.90};
+    struct truth_plant_spec first = *believed;
+    *out = *from;
+    for (int which = 0; which < truth_refit_count; which++) {
+        double *value = refit_value(out, (enum truth_refit)which);
+        double middle = *refit_value(&first, (enum truth_refit)which);
+        *value *= 1.0 + part * move[which];
+        *value = fmin(fmax(*value, (1.0 - most[which]) * middle), (1.0 + most[which]) * middle);
+    }
+}
+
+int truth_evidence_refit(const struct truth_drive *truth, const struct truth_plant_spec *believed,
+                         struct truth_drive *io_other, const struct truth_evidence_setting *setting,
+                         struct truth_evidence *out)
+{
+    const int steps = 12;
+    const double settled = 0.01, shortest = 0.1;
+    struct truth_evidence *next = malloc(sizeof *next);
+    int status = !next || truth_evidence_find(truth, io_other, setting, out) ? -1 : 0;
+    double part = 1.0;
+    for (int i = 0; i < steps && !status && part > shortest; i++) {
+        struct truth_drive moved = *io_other;
+        move_refit(&io_other->plant, out->move, part, believed, &moved.plant);
+        status = truth_evidence_find(truth, &moved, setting, next);
+        if (status || !(next->nats < out->nats)) {
+            part *= 0.5;
+            continue;
+        }
+        int enough = out->nats - next->nats < settled * out->nats;
+        *io_other = moved;
+        *out = *next;
+        part = enough ? 0.0 : fmin(1.0, 2.0 * part);
+    }
+    free(next);
     return status;
 }
 

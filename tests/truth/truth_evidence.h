@@ -55,6 +55,9 @@ struct truth_evidence {
     double residual[TRUTH_EVIDENCE_VALUES]; ///< of the mean period, projected
     int refits;                             ///< orthonormal directions of the refit
     double refit[truth_refit_count][TRUTH_EVIDENCE_VALUES];
+    double made_of[truth_refit_count][truth_refit_count]; ///< [direction][which]: what a number's change has of it
+    int which[truth_refit_count];                         ///< number that a direction is the first to be made of
+    double move[truth_refit_count];                       ///< relative changes that the projection stands for
     double stand_in[TRUTH_EVIDENCE_VALUES]; ///< direction of what stands in, orthogonal to the others, of length one
     double stand_in_size;                   ///< its length before, for a relative change by one; 0: none
 };
@@ -62,6 +65,11 @@ struct truth_evidence {
 /// Evidence of `truth` over `other`, refitted. Returns 0, or -1 when the drive cannot be run.
 int truth_evidence_find(const struct truth_drive *truth, const struct truth_drive *other,
                         const struct truth_evidence_setting *setting, struct truth_evidence *out);
+/// Evidence of `truth` over `io_other`, whose numbers are refitted step by step, within what `believed` may be off by:
+/// where a resonance moves by its own width, one projection says too much. Returns 0, or -1.
+int truth_evidence_refit(const struct truth_drive *truth, const struct truth_plant_spec *believed,
+                         struct truth_drive *io_other, const struct truth_evidence_setting *setting,
+                         struct truth_evidence *out);
 /// Evidence of lost rows.
 double truth_evidence_of_loss_nats(const struct truth_sensors *sensors, double rows);
 /// Cosine of the angle between two residuals.

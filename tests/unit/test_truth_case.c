@@ -299,6 +299,39 @@ static void test_truth_case_measures_a_size_from_the_given_model(void)
     }
 }
 
+/// A resonance that is off by its own width is no straight line: one projection leaves what a refit takes up.
+static void test_truth_evidence_refit_takes_up_a_resonance_that_is_off(void)
+{
+    struct truth_evidence_setting setting = plain_setting();
+    struct truth_drive drive = made.truth, near;
+    drive.plant.two_mass = 1;
+    drive.plant.motor_inertia_kgm2 = 0.003;
+    drive.plant.load_inertia_kgm2 = 0.002;
+    drive.plant.belt_stiffness_Nm_per_rad = 60.0;
+    drive.plant.belt_damping_Nms_per_rad = 0.015;
+    near = drive;
+    near.plant.belt_stiffness_Nm_per_rad *= 1.06;
+    TEST_ASSERT_EQUAL_INT(0, truth_evidence_find(&drive, &near, &setting, &evidence));
+    double projected = evidence.nats;
+    TEST_ASSERT_EQUAL_INT(0, truth_evidence_refit(&drive, &near.plant, &near, &setting, &evidence));
+    TEST_ASSERT_TRUE(projected > 10.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01 * projected, 0.0, evidence.nats);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 60.0, near.plant.belt_stiffness_Nm_per_rad);
+}
+
+/// Nor does it leave what the given model may be off by: an inertia that is off by more stays so.
+static void test_truth_evidence_refit_stays_within_what_is_believed(void)
+{
+    struct truth_evidence_setting setting = plain_setting();
+    struct truth_drive drive = made.truth, near = made.truth;
+    const struct truth_plant_spec believed = made.truth.plant;
+    drive.plant.motor_inertia_kgm2 *= 1.5;
+    drive.plant.two_mass = near.plant.two_mass = 0;
+    TEST_ASSERT_EQUAL_INT(0, truth_evidence_refit(&drive, &believed, &near, &setting, &evidence));
+    double moved = near.plant.motor_inertia_kgm2 / believed.motor_inertia_kgm2;
+    TEST_ASSERT_TRUE(moved >= 0.98 - 1e-9 && moved <= 1.02 + 1e-9);
+}
+
 static void test_truth_evidence_of_a_bias_is_that_of_a_mean(void)
 {
     struct truth_evidence_setting setting = plain_setting();
@@ -422,6 +455,8 @@ int main(void)
     RUN_TEST(test_truth_evidence_leaves_out_what_a_refit_takes_up);
     RUN_TEST(test_truth_evidence_lets_what_stands_in_move_within_its_reach);
     RUN_TEST(test_truth_case_measures_a_size_from_the_given_model);
+    RUN_TEST(test_truth_evidence_refit_takes_up_a_resonance_that_is_off);
+    RUN_TEST(test_truth_evidence_refit_stays_within_what_is_believed);
     RUN_TEST(test_truth_evidence_of_a_bias_is_that_of_a_mean);
     RUN_TEST(test_truth_evidence_of_an_encoder_is_that_of_two_columns_that_differ);
     RUN_TEST(test_truth_run_eccentric_encoder_shows_a_wave_per_turn);
