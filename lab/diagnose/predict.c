@@ -39,8 +39,7 @@ static void move_measured(struct predictor *p, size_t n, size_t i)
 }
 
 /// Sets the motor to where the sensors saw it, unless they saw nothing. What a speed column has taken a position to is
-/// less noisy for a while than the next position: a stiff belt, and a gap in it, feel the difference. What the model
-/// missed of the speed, it missed half of on the way: left there, it would add up, and the belt would answer to it.
+/// less noisy for a while than the next position: a stiff belt, and a gap in it, feel the difference.
 static void place_motor(struct predictor *p, size_t n)
 {
     const struct stretch *s = p->stretch;
@@ -51,9 +50,6 @@ static void place_motor(struct predictor *p, size_t n)
     struct sim_sensed sensed = {.position = s->position[n], .velocity = s->velocity[n]};
     sim_stepper_unsense(&p->stepper, &sensed, &motion);
     bool anew = !p->placed || (n == 0 && p->leaps);
-    double missed = motion.velocity - p->plant.velocity;
-    if (!anew)
-        p->plant.position += 0.5 * missed / p->stepper.model.sample_rate_hz;
     p->plant.position += (anew ? 1.0 : p->gain) * (motion.position - p->plant.position);
     p->plant.velocity = motion.velocity;
     p->placed = true;

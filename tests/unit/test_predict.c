@@ -385,28 +385,6 @@ static void test_predict_with_a_position_gain_leaves_nothing_of_two_masses(void)
     assert_all_zero(period, fmax(allowed_Nm, 100.0 * rounding));
 }
 
-/// A torque that the model lacks is missed where it acts. Half of what it does to the speed within a sample it does to
-/// the way as well, and a stiff belt between a motor misplaced by that and its load would make up for a part of it.
-static void test_predict_with_a_position_gain_gives_a_missing_torque_in_nm_beside_a_stiff_belt(void)
-{
-    const double size_Nm = 0.02, line = 56.0, scale = 0.005;
-    two_masses();
-    model.belt_stiffness_Nm_per_rad = 400.0;
-    model.coulomb_friction_Nm = 0.0;
-    switch_on("periodic_disturbance", size_Nm, 0.3, line * model.sample_rate_hz / period);
-    run_drive();
-    model.effect_on[sim_effect_find("periodic_disturbance")] = false;
-    predict(&model, &last_period, true, scale, mechanics, NULL);
-    double as_measured = rms_of_mechanics(), acting = scale / model.motor_inertia_kgm2 * size_Nm / sqrt(2.0);
-    TEST_ASSERT_DOUBLE_WITHIN(0.15 * acting, acting, as_measured); // the belt answers to it within the sample
-    static const double gains[] = {0.3, 0.05};
-    for (size_t i = 0; i < sizeof gains / sizeof gains[0]; i++) {
-        last_period.position_gain = gains[i];
-        predict(&model, &last_period, true, scale, mechanics, NULL);
-        TEST_ASSERT_DOUBLE_WITHIN(0.03 * as_measured, as_measured, rms_of_mechanics());
-    }
-}
-
 int main(void)
 {
     UNITY_BEGIN();
@@ -429,6 +407,5 @@ int main(void)
     RUN_TEST(test_predict_scales_by_the_given_inertia);
     RUN_TEST(test_predict_lets_a_belt_feel_less_of_a_position_s_noise_beside_a_good_speed);
     RUN_TEST(test_predict_with_a_position_gain_leaves_nothing_of_two_masses);
-    RUN_TEST(test_predict_with_a_position_gain_gives_a_missing_torque_in_nm_beside_a_stiff_belt);
     return UNITY_END();
 }
