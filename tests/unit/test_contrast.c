@@ -264,6 +264,24 @@ static void test_contrast_finds_the_phase_of_a_run_that_began_at_another_time(vo
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.1, 0.0, remainder(off, two_pi), message);
 }
 
+/// The noise of a run that began at another time is that under the line at its own phase: no line is left of it.
+static void test_noise_of_a_run_that_began_at_another_time_has_no_line_in_it(void)
+{
+    record(nothing, 22);
+    double quiet = evidence.covariance[4 * (size_t)(line_hz * samples / rate_hz)];
+    evidence_free(&evidence);
+    record(line, 22);
+    evidence.phase_free = true;
+    struct sim_model with = model;
+    double values[sim_effect_parameters_max] = {line_Nm, line_rad + 2.0, line_hz};
+    with.effect_on[disturbance()] = true;
+    memcpy(with.effect_parameters[disturbance()], values, sizeof values);
+    TEST_ASSERT_TRUE(evidence_estimate_noise(&evidence, &with));
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, evidence.tone_count, message);
+    double noise = evidence.covariance[4 * (size_t)(line_hz * samples / rate_hz)];
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.1 * quiet, quiet, noise, message);
+}
+
 static struct structure look(void)
 {
     struct structure found;
@@ -406,6 +424,7 @@ int main(void)
     RUN_TEST(test_contrast_sizes_a_fast_line_by_its_mean_over_a_sample);
     RUN_TEST(test_contrast_puts_back_what_the_model_of_the_noise_had);
     RUN_TEST(test_contrast_finds_the_phase_of_a_run_that_began_at_another_time);
+    RUN_TEST(test_noise_of_a_run_that_began_at_another_time_has_no_line_in_it);
     RUN_TEST(test_structure_is_not_found_in_noise);
     RUN_TEST(test_structure_is_no_slow_change_where_noise_is_that_of_a_few_instants);
     RUN_TEST(test_structure_finds_a_slow_change_in_its_octave);
