@@ -37,8 +37,8 @@ static inline struct stretch recorded_stretch(double *torque_ref, double *torque
                             .substeps = sim_substeps};
 }
 
-/// Starts at a position, records `periods` periods after `lead` rows, and estimates the noise under the true model, residuals in torques on
-/// 0.005 kg m2. Returns whether memory sufficed; to be freed either way.
+/// Starts at a position, records `periods` periods after `lead` rows, and estimates the noise under the true model,
+/// residuals in torques on 0.005 kg m2. Returns whether memory sufficed; to be freed either way.
 static inline bool recorded_drive_init(struct recorded_drive *self, const struct sim_model *truth, double start,
                                        recorded_command *command_at, size_t lead, size_t periods)
 {
