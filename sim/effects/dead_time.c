@@ -27,8 +27,17 @@ static bool delay_scan(const struct sim_model *model, const struct sim_coverage 
     return true;
 }
 
+/// A column that was read just before the command of its row began to act has a delay of nearly nothing.
 static void delay_say(const struct sim_finding *f, char *out_text, size_t size)
 {
+    const double nothing_s = 1e-6;
+    if (f->parameters[0] < nothing_s) {
+        snprintf(out_text, size,
+                 "Torque comes less than %.0e s after its command (dead time), but in a row it is that of the command "
+                 "before; the model has %.4g ms.",
+                 nothing_s, 1e3 * f->nominal[0]);
+        return;
+    }
     snprintf(out_text, size, "Torque comes %.4g +- %.2g ms after its command (dead time); the model has %.4g ms.",
              1e3 * f->parameters[0], 1e3 * f->deviations[0], 1e3 * f->nominal[0]);
 }
