@@ -486,7 +486,7 @@ static double bristle_rate(const struct state *s, const struct sim_stepper *step
 }
 
 /// The same, of a look ahead, where what counts is the torque: friction that is nearly built up is a soft spring, and
-/// little changes. In a step in which the motor may turn back that is as hard as in the direction in which it is harder.
+/// little changes. Where the motor may turn back, the harder of both directions counts.
 static double quick_bristle_rate(const struct state *s, const struct sim_stepper *stepper, double dry, double dt_s)
 {
     double speed = fabs(s->velocity[0]) / stepper->build_up, missing = 1.0 - sign_of(s->velocity[0]) * s->bristle / dry;
