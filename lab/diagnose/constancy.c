@@ -5,6 +5,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /// Sum over the slow courses of the squares of one run's contrasts along a column, which noise makes one each.
 static double slow_along_column(const struct evidence *e, const double *column, const double *contrasts,
@@ -26,10 +27,10 @@ static double slow_along_column(const struct evidence *e, const double *column, 
     return sum;
 }
 
-/// One coordinate over all runs: the largest.
-static double coordinate_nats(const struct fit_data *data, const struct fit *fit, size_t coordinate)
+/// One coordinate over all runs: the largest. contrasts: of all runs
+static double coordinate_nats(const struct fit_data *data, const struct fit *fit, const double *contrasts,
+                              size_t coordinate)
 {
-    const double *contrasts = fit->rows > data->values ? fit->residual + data->values : NULL;
     const double *column = fit->jacobian + coordinate * fit->rows;
     double most = 0.0;
     for (size_t i = 0; i < data->runs; i++) {
@@ -38,22 +39,72 @@ static double coordinate_nats(const struct fit_data *data, const struct fit *fit
         double *courses =
             e->contrast.values > 0 && P >= slow_fewest_periods ? malloc(slow_orders_most * P * sizeof *courses) : NULL;
         if (courses)
-            most = fmax(most, 0.5 * slow_along_column(e, column, contrasts ? contrasts : e->contrast.base, courses));
+            most = fmax(most, 0.5 * slow_along_column(e, column, contrasts, courses));
         free(courses);
         column += e->values;
-        contrasts = contrasts ? contrasts + e->contrast.values : NULL;
+        contrasts += e->contrast.values;
     }
     return most;
+}
+
+/// What stays of the contrasts of all runs under a model; NULL if memory is short.
+static double *contrasts_under(const struct fit_data *data, const struct hypothesis *hypothesis)
+{
+    double *all = malloc((data->contrasts + 1) * sizeof *all), *at = all;
+    bool good = all != NULL;
+    for (size_t i = 0; good && i < data->runs; i++) {
+        struct sim_model model;
+        hypothesis_model(hypothesis, NULL, &model);
+        good = contrast_align(&data->evidence[i], &model, &model) &&
+               contrast_residual(&data->evidence[i], &model, at, NULL);
+        at += data->evidence[i].contrast.values;
+    }
+    if (good)
+        return all;
+    free(all);
+    return NULL;
+}
+
+/// What the fit leaves of the contrasts of all runs: without an effect in time they are as they were; NULL if memory is
+/// short.
+static double *contrasts_left(const struct fit_data *data, const struct fit *fit)
+{
+    double *all = malloc((data->contrasts + 1) * sizeof *all), *at = all;
+    if (all && fit->rows > data->values)
+        memcpy(all, fit->residual + data->values, data->contrasts * sizeof *all);
+    for (size_t i = 0; all && fit->rows == data->values && i < data->runs; i++) {
+        const struct contrast *c = &data->evidence[i].contrast;
+        memcpy(at, c->base, c->values * sizeof *at);
+        at += c->values;
+    }
+    return all;
 }
 
 double constancy_nats(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit,
                       int effect)
 {
-    double most = 0.0;
-    for (size_t i = 0; i < hypothesis->count && !sim_effects[effect]->in_time; i++)
+    double most = 0.0, *contrasts = sim_effects[effect]->in_time ? NULL : contrasts_left(data, fit);
+    for (size_t i = 0; contrasts && i < hypothesis->count; i++)
         if (hypothesis->coordinates[i].effect == effect)
-            most = fmax(most, coordinate_nats(data, fit, i));
+            most = fmax(most, coordinate_nats(data, fit, contrasts, i));
+    free(contrasts);
     return most;
+}
+
+double constancy_nats_in_time(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit,
+                              int effect)
+{
+    struct hypothesis without = *hypothesis;
+    hypothesis_unname(&without, effect);
+    double *left = contrasts_under(data, hypothesis), *bare = contrasts_under(data, &without), nats = 0.0, rival = 0.0;
+    for (size_t i = 0; left && bare && i < data->contrasts; i++)
+        nats += 0.5 * (bare[i] * bare[i] - left[i] * left[i]);
+    for (size_t i = 0; bare && contrast_is_line(effect) && i < hypothesis->count; i++)
+        if (hypothesis->coordinates[i].effect < 0)
+            rival = fmax(rival, coordinate_nats(data, fit, bare, i));
+    free(left);
+    free(bare);
+    return nats - rival;
 }
 
 bool constancy_is_broken(double nats, double evidence)

@@ -15,7 +15,14 @@
 double constancy_nats(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit,
                       int effect);
 
-/// Whether that is beyond chance and no small part of what was found: a tenth of it comes and goes.
+/// What an effect in time takes out of the contrasts, in nats, less what a number of the given model that creeps would
+/// take instead of a line: beside a line of the excitation a slow change of the gain is another line. What such an
+/// effect gains in the mean of the periods alone any constant friction or torque would gain as well.
+/// Returns: 0 if memory is short
+double constancy_nats_in_time(const struct fit_data *data, const struct hypothesis *hypothesis, const struct fit *fit,
+                              int effect);
+
+/// Whether constancy_nats is beyond chance and no small part of what was found: a tenth of it comes and goes.
 /// evidence: nats of the effect
 bool constancy_is_broken(double nats, double evidence);
 

@@ -209,6 +209,20 @@ static bool is_in_time(const struct bench *b, int effect)
     return sim_effects[effect]->in_time && b->data->contrasts > 0;
 }
 
+/// Whether the periods themselves, not their mean, say that something changes, and no number of the given model that
+/// creeps would do as well.
+static bool is_seen_in_time(const struct bench *b, int effect, struct judgement *j)
+{
+    double nats = constancy_nats_in_time(b->data, b->hypothesis, b->fit, effect);
+    if (nats > search_threshold(b->data, effect))
+        return true;
+    if (!j->unexplained)
+        snprintf(j->where, sizeof j->where, "what %s takes of it is no better described than by another slow change",
+                 sim_effects[effect]->id);
+    j->unexplained = true;
+    return false;
+}
+
 /// Effects in time answer for what stays over time. Returns whether all stand that were named.
 static bool judge_in_time(const struct bench *b, struct judgement *j)
 {
@@ -219,7 +233,8 @@ static bool judge_in_time(const struct bench *b, struct judgement *j)
             continue;
         j->stands[e] = is_large_enough(b, e) &&
                        (!(j->leftover_in_time > 0.0) ||
-                        search_evidence(b->data, b->hypothesis, b->fit, e) > dominance * j->leftover_in_time);
+                        search_evidence(b->data, b->hypothesis, b->fit, e) > dominance * j->leftover_in_time) &&
+                       is_seen_in_time(b, e, j);
         all = all && j->stands[e];
     }
     return all;

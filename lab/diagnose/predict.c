@@ -224,11 +224,9 @@ static void settle_hidden(struct predictor *p, const struct square *phi, const d
 
 /// Passes over the period until the hidden masses repeat: one where the belt is linear. What a linear guess leaves
 /// otherwise fades over the next.
-static void settle(struct predictor *p)
+static void settle(struct predictor *p, struct square phi)
 {
     size_t passes = p->stepper.bend.count > 0 ? 2 : 1;
-    struct square phi = {{{0.0}}};
-    free_motion(p, &phi);
     phi = power(p->hidden, phi, p->stretch->samples);
     for (size_t pass = 0; pass < passes; pass++) {
         double x0[hidden_max] = {0.0};
@@ -251,13 +249,38 @@ static size_t friction_memory(const struct predictor *p)
     return n;
 }
 
+/// Whether the hidden masses run away while the motor is set to where it was measured, sample by sample: a belt that
+/// swings faster than that, with next to no damping, is shaken by it. phi: free motion over a sample.
+static bool runs_away(const struct predictor *p, struct square phi)
+{
+    const size_t many = 4096;
+    const double most = 1.005; // per sample; positions and speeds are a few powers of ten apart
+    double largest = 0.0;
+    phi = power(p->hidden, phi, many);
+    for (size_t i = 0; i < p->hidden; i++)
+        for (size_t j = 0; j < p->hidden; j++)
+            largest = fmax(largest, isfinite(phi.a[i][j]) ? fabs(phi.a[i][j]) : INFINITY);
+    return largest > pow(most, (double)many);
+}
+
+/// Nothing that such a model says is of any use: it is off by far more than any other.
+static void say_nothing(const struct stretch *stretch, double *out_mechanics, double *out_actuator)
+{
+    const double far = 1e3;
+    for (size_t n = 0; n < stretch->samples; n++) {
+        out_mechanics[n] = is_lost(stretch, n) ? 0.0 : far * stretch->torque[n];
+        if (out_actuator)
+            out_actuator[n] = out_mechanics[n];
+    }
+}
+
 /// One period ahead of the one that counts, for the hidden masses; for actuator and friction the last samples are
 /// enough.
-static void warm_up(struct predictor *p)
+static void warm_up(struct predictor *p, const struct square *phi)
 {
     size_t samples = p->stretch->samples;
     if (p->hidden > 0) {
-        settle(p);
+        settle(p, *phi);
         return;
     }
     const double lags = 40.0; // exp(-40): nothing of the start is left
@@ -317,8 +340,14 @@ void predict(const struct sim_model *model, const struct stretch *stretch, bool 
     sim_stepper_init_quick(&p.stepper, model, 1.0 / (model->sample_rate_hz * (double)stretch->substeps));
     p.hidden = 2 * (p.stepper.chain.masses - 1);
     start(&p);
+    struct square phi = {{{0.0}}};
+    free_motion(&p, &phi);
+    if (runs_away(&p, phi)) {
+        say_nothing(stretch, out_mechanics, out_actuator);
+        return;
+    }
     if (cyclic)
-        warm_up(&p);
+        warm_up(&p, &phi);
     double scale = scale_inertia * model->sample_rate_hz;
     for (size_t n = 0; n < stretch->samples; n++) {
         double now = predict_sample(&p, n);

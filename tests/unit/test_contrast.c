@@ -65,6 +65,12 @@ static double creep(size_t n)
     return 0.004 * (double)n / rows * sin(two_pi * 12.0 * (double)n / samples);
 }
 
+static double creeping_gain(size_t n)
+{
+    return 0.01 * (double)n / rows *
+           (0.3 * sin(two_pi * 5.0 * (double)n / samples) + 0.2 * cos(two_pi * 40.0 * (double)n / samples));
+}
+
 static double burst(size_t n)
 {
     bool on = n >= lead + 3 * samples + 100 && n < lead + 3 * samples + 130;
@@ -377,6 +383,36 @@ static void test_constancy_is_broken_by_what_creeps_along_the_name_and_by_nothin
     TEST_ASSERT_FALSE(constancy_is_broken(13.0, 2000.0)); // it comes and goes by less than a tenth
 }
 
+/// What a disturbance is worth that is named at a frequency, beside an inertia that may creep.
+static double worth_of_line(double hz)
+{
+    struct hypothesis hypothesis;
+    hypothesis_init(&hypothesis, &model, false, false);
+    double values[sim_effect_parameters_max] = {line_Nm, 0.0, hz};
+    TEST_ASSERT_TRUE(contrast_size_effect(&evidence, &model, disturbance(), values));
+    hypothesis_name(&hypothesis, disturbance(), values);
+    struct fit_data data = {
+        .runs = 1, .evidence = &evidence, .values = evidence.values, .contrasts = evidence.contrast.values};
+    struct fit fit = {.rows = data.values + data.contrasts};
+    fit.jacobian = calloc(hypothesis.count * fit.rows, sizeof *fit.jacobian);
+    for (size_t i = 0; i < hypothesis.count; i++)
+        if (hypothesis.coordinates[i].model_offset == offsetof(struct sim_model, motor_inertia_kgm2))
+            evidence_whiten(&evidence, block[0], NULL, fit.jacobian + i * fit.rows);
+    double nats = constancy_nats_in_time(&data, &hypothesis, &fit, disturbance());
+    free(fit.jacobian);
+    return nats;
+}
+
+static void test_constancy_tells_a_line_from_a_gain_that_creeps(void)
+{
+    record(line, 23);
+    TEST_ASSERT_TRUE_MESSAGE(worth_of_line(line_hz) > 100.0, message);
+    evidence_free(&evidence);
+    record(creeping_gain, 23);
+    double beside = 5.0 * rate_hz / samples + 0.4 * rate_hz / (periods * samples);
+    TEST_ASSERT_TRUE_MESSAGE(worth_of_line(beside) < 0.0, message);
+}
+
 static void test_structure_finds_a_burst_and_says_when(void)
 {
     record(burst, 17);
@@ -431,6 +467,7 @@ int main(void)
     RUN_TEST(test_structure_says_what_a_slow_change_is_worth);
     RUN_TEST(test_noise_leaves_slow_changes_out_where_they_stand_out);
     RUN_TEST(test_constancy_is_broken_by_what_creeps_along_the_name_and_by_nothing_else);
+    RUN_TEST(test_constancy_tells_a_line_from_a_gain_that_creeps);
     RUN_TEST(test_structure_finds_a_burst_and_says_when);
     RUN_TEST(test_structure_finds_a_bias_that_jumps_and_says_when);
     RUN_TEST(test_structure_merges_places_and_keeps_the_stronger_words);

@@ -385,6 +385,29 @@ static void test_predict_with_a_position_gain_leaves_nothing_of_two_masses(void)
     assert_all_zero(period, fmax(allowed_Nm, 100.0 * rounding));
 }
 
+/// Belts that swing faster than the samples come and are hardly damped shake the load wherever the motor is set anew.
+/// What that would grow to is no prediction: such a model is off by a thousand times the torque, and never by more.
+static void test_predict_of_a_belt_that_runs_away_says_nothing(void)
+{
+    const double far = 1e3, growth = 1.1;
+    double most = 0.0, largest = 0.0;
+    size_t away = 0;
+    two_masses();
+    run_drive();
+    for (size_t n = 0; n < period; n++)
+        most = fmax(most, fabs(last_period.torque[n]));
+    model.belt_damping_Nms_per_rad = 1e-3;
+    for (; model.belt_stiffness_Nm_per_rad < 1e6; model.belt_stiffness_Nm_per_rad *= growth) {
+        largest = 0.0;
+        predict(&model, &last_period, true, 0.005, mechanics, actuator);
+        for (size_t n = 0; n < period; n++)
+            largest = fmax(largest, isfinite(mechanics[n]) ? fabs(mechanics[n]) : INFINITY);
+        TEST_ASSERT_TRUE(largest <= far * most);
+        away += largest == far * most;
+    }
+    TEST_ASSERT_TRUE(away > 0);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -407,5 +430,6 @@ int main(void)
     RUN_TEST(test_predict_scales_by_the_given_inertia);
     RUN_TEST(test_predict_lets_a_belt_feel_less_of_a_position_s_noise_beside_a_good_speed);
     RUN_TEST(test_predict_with_a_position_gain_leaves_nothing_of_two_masses);
+    RUN_TEST(test_predict_of_a_belt_that_runs_away_says_nothing);
     return UNITY_END();
 }
