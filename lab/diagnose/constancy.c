@@ -74,7 +74,8 @@ static double *contrasts_left(const struct fit_data *data, const struct fit *fit
         memcpy(all, fit->residual + data->values, data->contrasts * sizeof *all);
     for (size_t i = 0; all && fit->rows == data->values && i < data->runs; i++) {
         const struct contrast *c = &data->evidence[i].contrast;
-        memcpy(at, c->base, c->values * sizeof *at);
+        if (c->values > 0)
+            memcpy(at, c->base, c->values * sizeof *at);
         at += c->values;
     }
     return all;

@@ -705,11 +705,12 @@ static bool pass_judgement(struct work *w, struct diagnosis *d, const struct hyp
     // so is all that leaves a model to which none at all would be preferable.
     const double clearly = 1.2, none = 1.0;
     double error = d->extended.validation_nrmse;
+    const struct recording *judged = &w->recordings[w->fit_count]; // a speed made of positions errs by more than noise
     struct judge_validation seen = {
         .mean_rms = d->extended.mean_rms,
         .worse =
             error > clearly * d->noise_floor_nrmse && (error > clearly * d->refitted.validation_nrmse || error > none),
-        .astray = w->recordings[w->fit_count].periodic && judge_is_astray(error, d->noise_floor_nrmse),
+        .astray = judged->periodic && !judged->derived && judge_is_astray(error, d->noise_floor_nrmse),
     };
     if (!judge_structure(&w->validate_data, &d->extended_model, &seen.over_time) ||
         !judge(&w->fit_data, &w->recordings[0].coverage, h, &w->fit, &seen, out_judgement))
@@ -717,7 +718,7 @@ static bool pass_judgement(struct work *w, struct diagnosis *d, const struct hyp
     if (!repeat_compare(&w->fit_data, h, &w->fit, &w->validate_data, w->evidence + w->fit_count, &w->repeat) ||
         !estimate_validation_noise(w, h, &d->extended_model)) // which that may have moved
         return false;
-    *out_distant = !w->recordings[w->fit_count].periodic && judge_distance(error, d->noise_floor_nrmse, out_judgement);
+    *out_distant = !judged->periodic && judge_distance(error, d->noise_floor_nrmse, out_judgement);
     if (!measure_gains(w, h))
         return false;
     refuse_claims(w, d, h, out_judgement);
